@@ -1,0 +1,339 @@
+"""The tables on disk: Parquet (zstd), explicit schemas, rows sorted, a version in the metadata.
+
+Sorting makes the bytes a function of the rows alone, whatever order they came in.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.errors import Fault, FaultsError
+from pipeline.files import replacing
+from pipeline.records import (
+    Box,
+    Exclusion,
+    Item,
+    Kind,
+    Match,
+    PairScore,
+    Parse,
+    Prediction,
+    Reply,
+    Snippet,
+    Stage,
+    StageOutput,
+    TrackBox,
+    TruthHazard,
+    VideoOutcome,
+    VideoScore,
+)
+
+SCHEMA_VERSION = "1"
+
+R = TypeVar("R")
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Table(Generic[R]):
+    """A kind of table: its name, its columns, its sort key, and how a record becomes a row."""
+
+    name: str
+    schema: pa.Schema
+    key: Callable[[R], tuple[Any, ...]]
+    to_row: Callable[[R], Row]
+    from_row: Callable[[Row], R]
+
+    def to_arrow(self, records: Iterable[R]) -> pa.Table:
+        """The records, sorted by key, as an Arrow table of this schema."""
+        rows = [self.to_row(record) for record in sorted(records, key=self.key)]
+        return pa.Table.from_pylist(rows, schema=self.schema)
+
+    def write(self, path: Path, records: Iterable[R], metadata: Mapping[str, str] | None = None) -> None:
+        """Write the records, sorted by key, whole or not at all."""
+        table = self.to_arrow(records)
+        marks = {"schema_version": SCHEMA_VERSION, "table": self.name, **(metadata or {})}
+        table = table.replace_schema_metadata({key: marks[key] for key in sorted(marks)})
+        with replacing(path) as temporary:
+            pq.write_table(table, temporary, compression="zstd", compression_level=3)
+
+    def read(self, path: Path) -> list[R]:
+        """Read the records of a file that `write` made.
+
+        Raises FaultsError when the file is no Parquet file or its columns are not these.
+        """
+        try:
+            file = pq.ParquetFile(path)
+        except (pa.ArrowException, OSError) as error:
+            fault = Fault(str(path), None, None, str(error), "a Parquet file", "Write it again.")
+            raise FaultsError([fault]) from error
+        with file:
+            found = {field.name: field.type for field in file.schema_arrow}
+            wanted = {field.name: field.type for field in self.schema}
+            faults = [
+                Fault(
+                    str(path),
+                    None,
+                    column,
+                    str(found.get(column, "no such column")),
+                    str(kind),
+                    f"This is not a `{self.name}` table of version {SCHEMA_VERSION}.",
+                )
+                for column, kind in wanted.items()
+                if found.get(column) != kind
+            ]
+            if faults:
+                raise FaultsError(faults)
+            return [self.from_row(row) for row in file.read(columns=list(wanted)).to_pylist()]
+
+
+def metadata(path: Path) -> dict[str, str]:
+    """The text marks in a Parquet file's metadata (`schema_version`, `config_sha256`, ...)."""
+    marks = pq.read_schema(path).metadata or {}
+    return {key.decode(): value.decode() for key, value in marks.items() if not key.startswith(b"ARROW")}
+
+
+def _box_row(track_box: TrackBox) -> Row:
+    box = track_box.box
+    return {
+        "video_id": track_box.video_id,
+        "frame_index": track_box.frame_index,
+        "track_id": track_box.track_id,
+        "kind": str(track_box.kind),
+        "x1_px": box.x1_px,
+        "y1_px": box.y1_px,
+        "x2_px": box.x2_px,
+        "y2_px": box.y2_px,
+    }
+
+
+def _box(row: Row) -> TrackBox:
+    box = Box(row["x1_px"], row["y1_px"], row["x2_px"], row["y2_px"])
+    return TrackBox(row["video_id"], row["frame_index"], row["track_id"], Kind(row["kind"]), box)
+
+
+def _box_key(track_box: TrackBox) -> tuple[Any, ...]:
+    return (track_box.video_id, track_box.frame_index, track_box.track_id)
+
+
+def _plain(record: Any) -> Row:
+    return {name: getattr(record, name) for name in record.__slots__}
+
+
+def _prediction(row: Row) -> Prediction:
+    return Prediction(
+        row["video_id"],
+        row["rank"],
+        row["description"],
+        row["label"],
+        tuple(row["track_ids"] or ()),
+        tuple(row["frame_indices"] or ()),
+    )
+
+
+def _stage_row(output: StageOutput) -> Row:
+    reply = output.reply
+    return {
+        "video_id": output.video_id,
+        "stage": str(output.stage),
+        "call": output.call,
+        "frame_index": output.frame_index,
+        "prompt_id": output.prompt_id,
+        "request_sha256": output.request_sha256,
+        "reply_text": reply.text,
+        "reply_model": reply.model,
+        "reply_latency_s": reply.latency_s,
+        "reply_input_tokens": reply.input_tokens,
+        "reply_output_tokens": reply.output_tokens,
+        "items": [_plain(item) for item in output.items],
+        "parse": str(output.parse),
+    }
+
+
+def _stage(row: Row) -> StageOutput:
+    return StageOutput(
+        row["video_id"],
+        Stage(row["stage"]),
+        row["call"],
+        row["prompt_id"],
+        row["request_sha256"],
+        Reply(
+            row["reply_text"],
+            row["reply_model"],
+            row["reply_latency_s"],
+            row["reply_input_tokens"],
+            row["reply_output_tokens"],
+        ),
+        tuple(Item(**item) for item in row["items"]),
+        Parse(row["parse"]),
+        row["frame_index"],
+    )
+
+
+def _snippet(row: Row) -> Snippet:
+    return Snippet(_box(row), None if row["excluded"] is None else Exclusion(row["excluded"]))
+
+
+_STRING, _INT, _REAL, _BOOL = pa.string(), pa.int32(), pa.float64(), pa.bool_()
+_STAGE_ORDER = {stage: place for place, stage in enumerate(Stage)}
+
+
+def _schema(optional: Iterable[str] = (), **columns: pa.DataType) -> pa.Schema:
+    missing = set(optional)
+    return pa.schema([pa.field(name, kind, nullable=name in missing) for name, kind in columns.items()])
+
+
+_BOX_COLUMNS = {
+    "video_id": _STRING,
+    "frame_index": _INT,
+    "track_id": _STRING,
+    "kind": _STRING,
+    "x1_px": _REAL,
+    "y1_px": _REAL,
+    "x2_px": _REAL,
+    "y2_px": _REAL,
+}
+
+BOXES: Table[TrackBox] = Table("boxes", _schema(**_BOX_COLUMNS), _box_key, _box_row, _box)
+
+TRUTH: Table[TruthHazard] = Table(
+    "truth",
+    _schema(
+        ("track_id", "first_frame", "last_frame"),
+        video_id=_STRING,
+        hazard_id=_STRING,
+        label=_STRING,
+        description=_STRING,
+        track_id=_STRING,
+        first_frame=_INT,
+        last_frame=_INT,
+    ),
+    lambda hazard: (hazard.video_id, hazard.hazard_id),
+    _plain,
+    lambda row: TruthHazard(**row),
+)
+
+PREDICTIONS: Table[Prediction] = Table(
+    "predictions",
+    _schema(
+        ("label", "track_ids", "frame_indices"),
+        video_id=_STRING,
+        rank=_INT,
+        description=_STRING,
+        label=_STRING,
+        track_ids=pa.list_(_STRING),
+        frame_indices=pa.list_(_INT),
+    ),
+    lambda prediction: (prediction.video_id, prediction.rank),
+    _plain,
+    _prediction,
+)
+
+STAGES: Table[StageOutput] = Table(
+    "stages",
+    _schema(
+        ("frame_index", "reply_latency_s", "reply_input_tokens", "reply_output_tokens"),
+        video_id=_STRING,
+        stage=_STRING,
+        call=_INT,
+        frame_index=_INT,
+        prompt_id=_STRING,
+        request_sha256=_STRING,
+        reply_text=_STRING,
+        reply_model=_STRING,
+        reply_latency_s=_REAL,
+        reply_input_tokens=_INT,
+        reply_output_tokens=_INT,
+        items=pa.list_(pa.struct([("rank", _INT), ("label", _STRING), ("description", _STRING)])),
+        parse=_STRING,
+    ),
+    lambda output: (output.video_id, _STAGE_ORDER[output.stage], output.call),
+    _stage_row,
+    _stage,
+)
+
+SNIPPETS: Table[Snippet] = Table(
+    "snippets",
+    _schema(("excluded",), **_BOX_COLUMNS, excluded=_STRING),
+    lambda snippet: _box_key(snippet.track_box),
+    lambda snippet: {
+        **_box_row(snippet.track_box),
+        "excluded": None if snippet.excluded is None else str(snippet.excluded),
+    },
+    _snippet,
+)
+
+MATCHES: Table[Match] = Table(
+    "matches",
+    _schema(
+        video_id=_STRING,
+        frame_index=_INT,
+        track_id=_STRING,
+        label=_STRING,
+        cosine=_REAL,
+        detected=_BOOL,
+        in_aos=_BOOL,
+    ),
+    lambda match: (match.video_id, match.frame_index, match.track_id, match.label),
+    _plain,
+    lambda row: Match(**row),
+)
+
+OUTCOMES: Table[VideoOutcome] = Table(
+    "outcomes",
+    _schema(
+        video_id=_STRING,
+        file=_STRING,
+        frame_count=_INT,
+        fps_hz=_REAL,
+        width_px=_INT,
+        height_px=_INT,
+        error=_STRING,
+    ),
+    lambda outcome: (outcome.video_id,),
+    _plain,
+    lambda row: VideoOutcome(**row),
+)
+
+PAIRS: Table[PairScore] = Table(
+    "pairs",
+    _schema(video_id=_STRING, prediction_rank=_INT, hazard_id=_STRING, cosine=_REAL, similarity=_REAL),
+    lambda pair: (pair.video_id, pair.prediction_rank, pair.hazard_id),
+    _plain,
+    lambda row: PairScore(**row),
+)
+
+VIDEOS: Table[VideoScore] = Table(
+    "videos",
+    _schema(
+        video_id=_STRING,
+        n_predictions=_INT,
+        n_hazards=_INT,
+        n_hazards_found=_INT,
+        best=_REAL,
+        worst=_REAL,
+        mean=_REAL,
+        besm=_REAL,
+        sam=_REAL,
+        detected=_BOOL,
+    ),
+    lambda score: (score.video_id,),
+    _plain,
+    lambda row: VideoScore(**row),
+)
+
+TABLES: tuple[Table[Any], ...] = (
+    BOXES,
+    TRUTH,
+    PREDICTIONS,
+    STAGES,
+    SNIPPETS,
+    MATCHES,
+    OUTCOMES,
+    PAIRS,
+    VIDEOS,
+)

@@ -1,0 +1,1 @@
+"""Predictions and truth to scores, a leaderboard and a static site."""
