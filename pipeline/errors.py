@@ -14,7 +14,7 @@ found, what was expected, and what to do.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 
 class CooolerError(Exception):
@@ -50,6 +50,10 @@ class Fault:
         if self.column is not None:
             place += f", column {self.column}"
         return f"{place}: found {self.found}; expected {self.expected}. {self.mend}"
+
+    def as_dict(self) -> dict[str, str | int | None]:
+        """The fields by name, for JSON."""
+        return asdict(self)
 
 
 class FaultsError(InputError):

@@ -208,7 +208,10 @@ class TruthHazard:
 
 @dataclass(frozen=True, slots=True)
 class VideoOutcome:
-    """How the pipeline fared on one video file: `error` is empty when all went well."""
+    """How the pipeline fared on one video file: `error` is empty when all went well.
+
+    `note` says what was odd but did not stop it (a header that counts frames that are not there).
+    """
 
     video_id: str
     file: str
@@ -217,6 +220,7 @@ class VideoOutcome:
     width_px: int
     height_px: int
     error: str
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)

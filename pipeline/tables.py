@@ -293,6 +293,7 @@ OUTCOMES: Table[VideoOutcome] = Table(
         width_px=_INT,
         height_px=_INT,
         error=_STRING,
+        note=_STRING,
     ),
     lambda outcome: (outcome.video_id,),
     _plain,

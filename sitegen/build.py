@@ -1,0 +1,192 @@
+"""Builds the site: gather, make what pictures are missing, render the pages, write what changed."""
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from pipeline.benchmark import Benchmark
+from pipeline.errors import OutsideError
+from pipeline.files import sha256_of
+from pipeline.records import Evaluation
+from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
+from sitegen.gathered import VideoMedia, path_names
+from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json
+from sitegen.output import Output, open_output, stamped, tree_sha256
+from sitegen.pages import Page, data_files, make_pages
+from sitegen.submissions import StoredSubmission
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+Tell = Callable[[str, int, int], None]
+"""Told what is being done, how many of it are done, and how many there are."""
+
+PLOTLY = "assets/plotly.min.js"
+_FEW = 2  # starting processes costs more than this many clips
+
+
+@dataclass(frozen=True, slots=True)
+class BuildReport:
+    """What a build did: files written, left as they were, removed; videos decoded; the tree's hash.
+
+    `bytes` is the size of all files of the site.
+    """
+
+    folder: Path
+    written: int
+    unchanged: int
+    removed: int
+    decoded: int
+    tree_sha256: str
+    bytes: int
+
+
+def build_site(
+    benchmark: Benchmark,
+    out: Path,
+    board: Sequence[tuple[StoredSubmission, Evaluation]],
+    bar: "Progress | None" = None,
+    *,
+    settings: MediaSettings | None = None,
+    jobs: int = 2,
+) -> BuildReport:
+    """Build the site of `benchmark` with the scored submissions of `board` in the folder `out`.
+
+    The same inputs give the same bytes in every folder. Pictures of a video are made again only
+    when its clip, its boxes or the settings changed. Raises InputError when the truth, the boxes,
+    the records or the attribution cannot be read.
+    """
+    tell = _telling(bar)
+    truth = read_truth_by_video(benchmark)
+    names = path_names(truth)
+    boxes = read_boxes(benchmark, truth)
+    output = open_output(out)
+    todo = media_jobs(benchmark, names, boxes, settings or MediaSettings())
+    media, remembered, decoded = _all_media(output, todo, jobs, tell)
+    data = gather(benchmark, truth, boxes, media, board)
+
+    output.add_all(_assets(with_charts=bool(board)))
+    output.add_all(data_files(data))
+    pages = _rendered(make_pages(data), len(names) + len(board) + 3, tell)
+    blank = {path: sha256_of(page) for path, page in pages.items()}
+    digest = tree_sha256({**output.files, **blank})
+    output.add_all((path, stamped(page, digest)) for path, page in pages.items())
+    removed = output.finish(remembered)
+    size = sum(output.sizes.values())
+    return BuildReport(out, output.written, output.unchanged, removed, decoded, digest, size)
+
+
+def _telling(bar: "Progress | None") -> Tell:
+    """Progress as a line of `bar` for each thing done; silent without one."""
+    if bar is None:
+        return lambda what, done, total: None
+    lines: dict[str, Any] = {}
+
+    def tell(what: str, done: int, total: int) -> None:
+        if what not in lines:
+            lines[what] = bar.add_task(what, total=total)
+        bar.update(lines[what], completed=done)
+
+    return tell
+
+
+def find_templates() -> Path:
+    """The folder of templates: in the installed package, or at the root of the checkout.
+
+    Raises OutsideError when it is in neither place.
+    """
+    here = Path(__file__).resolve().parent
+    for folder in (here / "templates", here.parent / "templates"):
+        if (folder / "base.html").is_file():
+            return folder
+    raise OutsideError(f"{here}: the templates are missing. Install COOOLER again.")
+
+
+def environment() -> Environment:
+    """The jinja environment: everything escaped, an undefined name is an error."""
+    return Environment(
+        loader=FileSystemLoader(find_templates()),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def _rendered(pages: Iterator[Page], total: int, tell: Tell) -> dict[str, bytes]:
+    """Path -> page with an empty place for the tree's hash. Raises ValueError for a path that comes twice."""
+    env = environment()
+    rendered: dict[str, bytes] = {}
+    for done, page in enumerate(pages, start=1):
+        if page.path in rendered:
+            raise ValueError(f"{page.path}: two pages of one path")
+        text = env.get_template(page.template).render(page=page.context, shell=page.context.shell)
+        rendered[page.path] = text.encode()
+        tell("Rendering pages", done, total)
+    return rendered
+
+
+def _assets(with_charts: bool) -> Iterator[tuple[str, bytes]]:
+    folder = find_templates() / "assets"
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.name.startswith("."):
+            yield f"assets/{path.relative_to(folder).as_posix()}", path.read_bytes()
+    if with_charts:
+        from plotly.offline import get_plotlyjs  # noqa: PLC0415 - heavy
+
+        yield PLOTLY, get_plotlyjs().encode()
+
+
+def _all_media(
+    output: Output, todo: Sequence[MediaJob], jobs: int, tell: Tell
+) -> tuple[dict[str, VideoMedia], dict[str, Any], int]:
+    """The pictures of all videos, made or kept; what the manifest remembers; how many were made."""
+    media: dict[str, VideoMedia] = {}
+    remembered: dict[str, Any] = {}
+    missing = []
+    for job in todo:
+        kept = _kept(output, job)
+        if kept is None:
+            missing.append(job)
+        else:
+            media[job.video_id], remembered[job.video_id] = kept
+    for done, (job, made) in enumerate(_make_all(missing, jobs), start=1):
+        output.add_all(made.files)
+        media[job.video_id] = made.media
+        remembered[job.video_id] = {
+            "key": job.key,
+            "files": {path: output.files[path] for path, _ in made.files},
+            "media": media_to_json(made.media),
+        }
+        tell("Cutting keyframes", done, len(missing))
+    return media, remembered, len(missing)
+
+
+def _kept(output: Output, job: MediaJob) -> tuple[VideoMedia, Any] | None:
+    """The pictures that an earlier build made of the same things, when they are still there."""
+    entry = output.before.get("media", {}).get(job.video_id)
+    if not isinstance(entry, dict) or entry.get("key") != job.key:
+        return None
+    try:
+        found = media_from_json(entry["media"])
+        return (found, entry) if output.kept(entry["files"]) else None
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+
+
+def _make_all(todo: Sequence[MediaJob], jobs: int) -> Iterator[tuple[MediaJob, MadeMedia]]:
+    """Each job with its pictures, as soon as they are made."""
+    if jobs < 2 or len(todo) <= _FEW:
+        for job in todo:
+            yield job, make_media(job)
+        return
+    with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=multiprocessing.get_context("spawn")) as pool:
+        futures = {pool.submit(make_media, job): job for job in todo}
+        for future in as_completed(futures):
+            yield futures.pop(future), future.result()

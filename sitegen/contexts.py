@@ -1,0 +1,404 @@
+"""What each template is given: one frozen dataclass a template. Texts come ready to print.
+
+Paths are from the site's root; `Shell.root` leads there from the page ("" or "../").
+"""
+
+from dataclasses import dataclass
+
+from sitegen.numerals import Score
+from sitegen.words import Diff
+
+
+@dataclass(frozen=True, slots=True)
+class Shell:
+    """What every page has. `section` names the entry of the menu that the page belongs to."""
+
+    title: str
+    description: str
+    root: str
+    section: str
+    benchmark: str
+    version: str
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A link inside the site; `href` is from the site's root."""
+
+    text: str
+    href: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoardRow:
+    """A row of the leaderboard; `key` holds what search looks through, in lower case."""
+
+    rank: int
+    rank_text: str
+    slug: str
+    name: str
+    authors: str
+    agents: str
+    is_baseline: bool
+    besm: Score
+    sam: Score
+    detection: Score
+    recall: Score | None
+    date: str
+    signature_short: str
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeatCell:
+    """One video under one system."""
+
+    video_id: str
+    href: str
+    score: Score
+    detected: bool
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeatRow:
+    """A system's cells, in the order of the videos."""
+
+    name: str
+    slug: str
+    cells: tuple[HeatCell, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A plotly figure (by id, in the page's data file) with the words and the table behind it."""
+
+    chart_id: str
+    title: str
+    summary: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class VideoCard:
+    """A video in a grid; `state` is `found`, `partly`, `missed` or `none` (no hazard in the truth)."""
+
+    video_id: str
+    href: str
+    picture: str
+    picture_width: int
+    picture_height: int
+    alt: str
+    labels: str
+    descriptions: tuple[str, ...]
+    best: Score | None
+    best_by: str
+    found_by: str
+    state: str
+    length: str
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A name and a value; `code` asks for a monospaced value, `href` makes it a link out."""
+
+    name: str
+    value: str
+    code: bool = False
+    href: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LeaderboardPage:
+    """index.html"""
+
+    shell: Shell
+    facts: tuple[Fact, ...]
+    paragraphs: tuple[str, ...]
+    rows: tuple[BoardRow, ...]
+    signatures: tuple[str, ...]
+    threshold: str
+    charts: tuple[Chart, ...]
+    chart_data: str
+    heat: tuple[HeatRow, ...]
+    cards: tuple[VideoCard, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class VideosPage:
+    """videos.html"""
+
+    shell: Shell
+    cards: tuple[VideoCard, ...]
+    summary: str
+    threshold: str
+
+
+@dataclass(frozen=True, slots=True)
+class OverlayBox:
+    """A box in viewBox units (the video's pixels); texts are numbers for attributes."""
+
+    x: str
+    y: str
+    width: str
+    height: str
+    text_y: str
+    track: str
+    hazard: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FilmFrame:
+    """A keyframe in the strip."""
+
+    number: int
+    index: int
+    time: str
+    thumb: str
+    full: str
+    alt: str
+    boxes: tuple[OverlayBox, ...]
+    is_cover: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CropView:
+    """A crop with what was said about its track."""
+
+    picture: str
+    width: int
+    height: int
+    alt: str
+    track: str
+    hazard: bool
+    detail: str
+    seen_as: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthView:
+    """A truth hazard."""
+
+    hazard_id: str
+    label: str
+    description: str
+    where: str
+
+
+@dataclass(frozen=True, slots=True)
+class CaptionView:
+    """A prediction, against the truth hazard it matches best."""
+
+    rank: int
+    label: str
+    text: str
+    tracks: str
+    hazard_id: str
+    score: Score | None
+    note: str
+    diff: Diff
+
+
+@dataclass(frozen=True, slots=True)
+class SystemView:
+    """All that one system said about the video."""
+
+    slug: str
+    name: str
+    agents: str
+    is_baseline: bool
+    besm: Score
+    sam: Score
+    verdict: str
+    verdict_text: str
+    captions: tuple[CaptionView, ...]
+    empty_text: str
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixRow:
+    """A prediction's cosine with every truth hazard; `chosen` numbers the match."""
+
+    system: str
+    first_of_system: bool
+    span: int
+    rank: int
+    text: str
+    cells: tuple[Score, ...]
+    chosen: int
+
+
+@dataclass(frozen=True, slots=True)
+class Saying:
+    """One thing that a stage said; `times` counts equal answers in a row, as text or empty."""
+
+    where: str
+    times: str
+    items: tuple[tuple[str, str], ...]
+    reply: str
+    parse: str
+
+
+@dataclass(frozen=True, slots=True)
+class StageView:
+    """A stage of one system on one video."""
+
+    code: str
+    name: str
+    meaning: str
+    agent: str
+    prompt_id: str
+    calls: str
+    sayings: tuple[Saying, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackCheck:
+    """The verification of one track: how many snippets counted, why others did not, what matched."""
+
+    track: str
+    hazard: bool
+    snippets: str
+    excluded: str
+    best_label: str
+    best: Score | None
+    detected: str
+    in_aos: str
+
+
+@dataclass(frozen=True, slots=True)
+class Transcript:
+    """What every stage of one system said about the video."""
+
+    slug: str
+    name: str
+    summary: str
+    stages: tuple[StageView, ...]
+    tracks: tuple[TrackCheck, ...]
+    tracks_summary: str
+    error: str
+
+
+@dataclass(frozen=True, slots=True)
+class VideoPage:
+    """videos/<name>.html"""
+
+    shell: Shell
+    video_id: str
+    heading: str
+    facts: tuple[Fact, ...]
+    truth: tuple[TruthView, ...]
+    problem: str
+    note: str
+    width: int
+    height: int
+    frames: tuple[FilmFrame, ...]
+    cover: FilmFrame | None
+    clip: str
+    has_boxes: bool
+    crops: tuple[CropView, ...]
+    systems: tuple[SystemView, ...]
+    matrix_columns: tuple[TruthView, ...]
+    matrix: tuple[MatrixRow, ...]
+    transcripts: tuple[Transcript, ...]
+    unrecorded: str
+    threshold: str
+    threshold_share: int
+    label_px: str
+    previous: Link | None
+    following: Link | None
+    place: str
+
+
+@dataclass(frozen=True, slots=True)
+class VideoLine:
+    """A video in a submission's table."""
+
+    video_id: str
+    href: str
+    labels: str
+    captions: tuple[str, ...]
+    best: Score
+    besm: Score
+    sam: Score
+    verdict: str
+    verdict_text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Extreme:
+    """One of a submission's best or worst videos."""
+
+    video_id: str
+    href: str
+    picture: str
+    alt: str
+    truth: str
+    caption: str
+    score: Score
+
+
+@dataclass(frozen=True, slots=True)
+class SubmissionPage:
+    """submissions/<slug>.html"""
+
+    shell: Shell
+    name: str
+    agents: str
+    is_baseline: bool
+    rank_text: str
+    cards: tuple[Fact, ...]
+    lines: tuple[VideoLine, ...]
+    best: tuple[Extreme, ...]
+    worst: tuple[Extreme, ...]
+    provenance: tuple[Fact, ...]
+    warnings: tuple[str, ...]
+    signature: str
+    threshold: str
+
+
+@dataclass(frozen=True, slots=True)
+class ExampleRow:
+    """A caption of the worked example."""
+
+    caption: str
+    similarity: str
+    verdict: str
+
+
+@dataclass(frozen=True, slots=True)
+class PromptView:
+    """A prompt of the paper; `hint` is ours."""
+
+    prompt_id: str
+    section: str
+    system: str
+    user: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class ModelView:
+    """A model that COOOLER can use."""
+
+    part: str
+    name: str
+    licence: str
+    role: str
+
+
+@dataclass(frozen=True, slots=True)
+class MethodPage:
+    """method.html"""
+
+    shell: Shell
+    threshold: str
+    signature: str
+    signature_parts: tuple[tuple[str, str], ...]
+    prompts: tuple[PromptView, ...]
+    models: tuple[ModelView, ...]
+    systems: tuple[tuple[str, str, str], ...]
+    attribution: tuple[str, ...]
+    verify: str

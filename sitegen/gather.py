@@ -1,0 +1,126 @@
+"""Reads what a site is made of: truth, boxes, records of pipeline runs, clips."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TypeVar
+
+from pipeline.benchmark import Benchmark
+from pipeline.errors import ConfigError
+from pipeline.files import sha256_file
+from pipeline.records import Evaluation, Match, Snippet, StageOutput, TrackBox, TruthHazard, VideoOutcome
+from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES, Table
+from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names
+from sitegen.leaderboard import rank
+from sitegen.media import MediaJob, MediaSettings
+from sitegen.readers import read_truth
+from sitegen.submissions import StoredSubmission
+
+CLIPS = (".mp4", ".m4v", ".webm", ".mov", ".mkv", ".avi")
+
+R = TypeVar("R", TrackBox, StageOutput, Snippet, Match, VideoOutcome, TruthHazard)
+
+
+def read_truth_by_video(benchmark: Benchmark) -> dict[str, tuple[TruthHazard, ...]]:
+    """Video id -> its truth rows."""
+    return _grouped(read_truth(benchmark.truth), _video_of)
+
+
+def read_boxes(benchmark: Benchmark, video_ids: Iterable[str]) -> dict[str, tuple[TrackBox, ...]]:
+    """Video id -> all boxes of it; empty when the benchmark has no table of boxes."""
+    if not benchmark.boxes.is_file():
+        return {}
+    wanted = set(video_ids)
+    rows = [row for row in BOXES.read(benchmark.boxes) if row.video_id in wanted]
+    return _grouped(rows, _video_of)
+
+
+def read_attribution(benchmark: Benchmark) -> str:
+    """The text that says where the clips come from; empty when the settings name none.
+
+    Raises ConfigError when the file that the settings name cannot be read.
+    """
+    name = benchmark.settings.attribution
+    if not name:
+        return ""
+    path = benchmark.root / name
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"{path}: not readable ({error}); expected the text that `attribution` names."
+        ) from error
+
+
+def media_jobs(
+    benchmark: Benchmark,
+    names: Mapping[str, str],
+    boxes: Mapping[str, tuple[TrackBox, ...]],
+    settings: MediaSettings,
+) -> list[MediaJob]:
+    """What every video's pictures are made of, in the order of the ids."""
+    clips = {path.stem: path for path in sorted(benchmark.videos.glob("*")) if path.suffix.lower() in CLIPS}
+    jobs = []
+    for video_id, name in sorted(names.items()):
+        clip = clips.get(video_id)
+        digest = sha256_file(clip) if clip else ""
+        shown = benchmark.settings.show_videos
+        jobs.append(MediaJob(video_id, name, clip, digest, boxes.get(video_id, ()), shown, settings))
+    return jobs
+
+
+def gather(
+    benchmark: Benchmark,
+    truth: Mapping[str, tuple[TruthHazard, ...]],
+    boxes: Mapping[str, tuple[TrackBox, ...]],
+    media: Mapping[str, VideoMedia],
+    board: Sequence[tuple[StoredSubmission, Evaluation]],
+) -> SiteData:
+    """All data of the site; systems best first. Raises InputError when their signatures differ."""
+    stored = {evaluation.submission.name: one for one, evaluation in board}
+    ranked = rank([evaluation for _, evaluation in board])
+    systems = [_system(row.rank, stored[row.evaluation.submission.name], row.evaluation) for row in ranked]
+    on_keyframes = {}
+    for video_id, rows in boxes.items():
+        wanted = {frame.index for frame in media[video_id].frames}
+        on_keyframes[video_id] = tuple(row for row in rows if row.frame_index in wanted)
+    attribution = read_attribution(benchmark)
+    return SiteData(
+        benchmark.settings, truth, on_keyframes, media, path_names(truth), tuple(systems), attribution
+    )
+
+
+def _system(place: int, stored: StoredSubmission, evaluation: Evaluation) -> System:
+    stages, snippets = _table(stored, STAGES), _table(stored, SNIPPETS)
+    matches = _table(stored, MATCHES)
+    outcomes = {row.video_id: row for rows in _table(stored, OUTCOMES).values() for row in rows}
+    records = {
+        video_id: Records(
+            stages.get(video_id, ()),
+            snippets.get(video_id, ()),
+            matches.get(video_id, ()),
+            outcomes.get(video_id),
+        )
+        for video_id in sorted({*stages, *snippets, *matches, *outcomes})
+    }
+    facts = (
+        ("SHA-256 of the file as it came", stored.original_sha256),
+        ("SHA-256 of the predictions", stored.predictions_sha256),
+        ("SHA-256 of the configuration", stored.config_sha256),
+    )
+    agents = stored.agents or "Not stated"
+    return System(place, stored.slug, agents, "baseline" in agents.casefold(), evaluation, facts, records)
+
+
+def _table(stored: StoredSubmission, table: Table[R]) -> dict[str, tuple[R, ...]]:
+    path = stored.folder / f"{table.name}.parquet"
+    return _grouped(table.read(path), _video_of) if path.is_file() else {}
+
+
+def _video_of(row: R) -> str:
+    return row.track_box.video_id if isinstance(row, Snippet) else row.video_id
+
+
+def _grouped(rows: Iterable[R], key: Callable[[R], str]) -> dict[str, tuple[R, ...]]:
+    groups: dict[str, list[R]] = {}
+    for row in rows:
+        groups.setdefault(key(row), []).append(row)
+    return {name: tuple(found) for name, found in groups.items()}

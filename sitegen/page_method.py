@@ -1,0 +1,72 @@
+"""The method page: what the numbers mean, who made the captions, and how to check all of it."""
+
+from pipeline.prompts import templates
+from sitegen.contexts import MethodPage, ModelView, PromptView, Shell
+from sitegen.gathered import SiteData
+from sitegen.words import visible
+
+MODELS = (
+    ModelView(
+        "Text embedder", "all-MiniLM-L6-v2, fp32", "Apache-2.0", "Scores every caption; part of the signature"
+    ),
+    ModelView("Noun chunks", "spaCy en_core_web_sm", "MIT", "Track 2: elements in the answers"),
+    ModelView(
+        "Vision agent (baseline)",
+        "EfficientNet-Lite0 on box crops, with the tracks' motion",
+        "Apache-2.0",
+        "Stands in for the paper's vision-language models; works without a network",
+    ),
+    ModelView(
+        "Language agent (baseline)",
+        "Fixed rules over spaCy and the embedder",
+        "MIT (this project)",
+        "Stands in for the paper's language model; same input, same output",
+    ),
+    ModelView(
+        "Image-text matcher (baseline)",
+        "ConSE: the classifier's classes, averaged as text",
+        "Apache-2.0 weights",
+        "Stands in for CLIP in the verification",
+    ),
+)
+
+# One line a file, "hash  path", sorted, hashed; a page counts with its own footer's hash left out.
+VERIFY = """find . -type f ! -name '.*' | sed 's|^\\./||' | while read -r f; do
+  case "$f" in
+    *.html) h=$(sed 's|id="tree-sha256">[0-9a-f]*<|id="tree-sha256"><|' "$f" | sha256sum) ;;
+    *) h=$(sha256sum < "$f") ;;
+  esac
+  printf '%s  %s\\n' "${h%% *}" "$f"
+done | LC_ALL=C sort | sha256sum"""
+
+SIGNATURE_PARTS = (
+    ("coooler", "version of the metric's definition"),
+    ("emb", "the embedding model and the hash of its weights and tokenizer"),
+    ("truth", "hash of the truth's content, whatever its file format"),
+    ("n", "number of videos in the truth: every mean is over all of them"),
+    ("thr", "a caption detects its hazard when its similarity is above this"),
+    ("nohaz", "rule for a video without a hazard: 1 for silence, 0 for any caption"),
+    ("clip", "each pair's cosine is clipped to 0–1 before any mean"),
+)
+
+
+def method_page(data: SiteData, shell: Shell) -> MethodPage:
+    """The context of method.html."""
+    signature = str(data.systems[0].evaluation.card.signature) if data.systems else ""
+    prompts = tuple(
+        PromptView(name, part["section"], part["system"], part["user"], part["format_hint"])
+        for name, part in templates().items()
+    )
+    systems = tuple((visible(s.name), s.slug, visible(s.agents)) for s in data.systems)
+    attribution = tuple(visible(part) for part in data.attribution.split("\n\n") if part.strip())
+    return MethodPage(
+        shell,
+        f"{data.settings.threshold:.2f}",
+        signature,
+        SIGNATURE_PARTS,
+        prompts,
+        MODELS,
+        systems,
+        attribution,
+        VERIFY,
+    )

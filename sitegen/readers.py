@@ -1,0 +1,231 @@
+"""Outside files to records: truth and predictions as Parquet, CSV or JSON Lines.
+
+A file is read whole or refused with every fault in it. The columns and their meaning are those of
+`TruthHazard` and `Prediction`, the same in each format.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pipeline.records import Prediction, TruthHazard
+from sitegen import checks
+from sitegen.checks import Faults, Wrong, is_missing, visible
+from sitegen.sheets import Sheet, load
+
+PREDICTION_COLUMNS = ("video_id", "rank", "description", "label", "track_ids", "frame_indices")
+TRUTH_COLUMNS = ("video_id", "hazard_id", "label", "description", "track_id", "first_frame", "last_frame")
+
+_PREDICTION_REQUIRED = PREDICTION_COLUMNS[:3]
+_TRUTH_REQUIRED = TRUTH_COLUMNS[:4]
+_SHOWN_IDS = 20
+_SUGGESTIONS = 20
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+_BAD: Any = object()  # a cell whose fault is already noted
+
+
+@dataclass(frozen=True, slots=True)
+class ReadPredictions:
+    """What a predictions file holds, sorted by video and rank.
+
+    `source_format` is `csv`, `jsonl` or `parquet`; `sha256` is of the file's bytes;
+    `config_sha256` is the run configuration that the pipeline noted in its Parquet, else empty.
+    """
+
+    predictions: tuple[Prediction, ...]
+    source_format: str
+    sha256: str
+    warnings: tuple[str, ...]
+    config_sha256: str = ""
+
+
+def read_predictions(path: Path, truth: Iterable[TruthHazard] | None = None) -> ReadPredictions:
+    """The predictions in a file; with `truth`, their videos must be among its videos.
+
+    A file with a header but no rows is accepted with a warning: it predicts nothing. Hazard videos
+    of the truth that have no prediction are a warning. Raises FaultsError with every fault.
+    """
+    faults = Faults(visible(str(path), 1_000))
+    sheet, source_format, sha256 = load(path, PREDICTION_COLUMNS, faults)
+    _missing_columns(sheet, _PREDICTION_REQUIRED, faults)
+    hazards = None if truth is None else list(truth)
+    known = None if hazards is None else {hazard.video_id for hazard in hazards}
+
+    videos = _column(sheet, "video_id", _video_check(known), faults)
+    ranks = _column(sheet, "rank", lambda value: checks.whole(value, 1), faults)
+    descriptions = _column(sheet, "description", checks.description, faults)
+    labels = _column(sheet, "label", checks.text, faults, None)
+    tracks = _column(sheet, "track_ids", checks.track_ids, faults, ())
+    frames = _column(sheet, "frame_indices", checks.frame_indices, faults, ())
+    _unique(sheet, videos, ranks, "rank", faults)
+    faults.raise_if_any()
+
+    rows = zip(videos, ranks, descriptions, labels, tracks, frames, strict=True)
+    predictions = sorted((Prediction(*row) for row in rows), key=lambda row: (row.video_id, row.rank))
+    warnings = _unknown_columns(sheet, PREDICTION_COLUMNS)
+    if not predictions:
+        warnings.append("The file holds no prediction.")
+    warnings += _missing_videos(predictions, hazards or ())
+    config = sheet.metadata.get("config_sha256", "")
+    config = config if _SHA256.fullmatch(config) else ""
+    return ReadPredictions(tuple(predictions), source_format, sha256, tuple(warnings), config)
+
+
+def read_truth(path: Path) -> list[TruthHazard]:
+    """The truth in a file, sorted by video and hazard.
+
+    A row without label and description says that its video has no hazard, and must be the video's
+    only row; its `hazard_id` may be empty. Raises FaultsError with every fault.
+    """
+    faults = Faults(visible(str(path), 1_000))
+    sheet, _, _ = load(path, TRUTH_COLUMNS, faults)
+    _missing_columns(sheet, _TRUTH_REQUIRED, faults)
+    if not sheet.rows and not faults.kept:
+        faults.stop("no rows", "at least one video", "Add a row for every video of the benchmark.")
+
+    videos = _column(sheet, "video_id", checks.safe_identifier, faults)
+    labels = _column(sheet, "label", checks.text, faults, "")
+    descriptions = _column(sheet, "description", checks.description, faults, "")
+    hazard_ids = _column(sheet, "hazard_id", checks.identifier, faults, "")
+    tracks = _column(sheet, "track_id", checks.identifier, faults, None)
+    firsts = _column(sheet, "first_frame", lambda value: checks.whole(value, 0), faults, None)
+    lasts = _column(sheet, "last_frame", lambda value: checks.whole(value, 0), faults, None)
+    for row, hazard_id, label, text in zip(sheet.rows, hazard_ids, labels, descriptions, strict=True):
+        if label and label is not _BAD and text == "":
+            mend = "Describe the hazard in a sentence, or clear the label of a video without hazard."
+            faults.add(row, "description", "a label without a description", "both or neither", mend)
+        if hazard_id == "" and text:
+            faults.add(row, "hazard_id", "an empty cell", "an id", "Number the hazards of a video 1, 2, ...")
+    for row, first, last in zip(sheet.rows, firsts, lasts, strict=True):
+        if isinstance(first, int) and isinstance(last, int) and last < first:
+            found = f"{last}, before first_frame {first}"
+            faults.add(row, "last_frame", found, "first_frame or later", "Swap or correct the two.")
+    _unique(sheet, videos, hazard_ids, "hazard_id", faults)
+    _no_hazard_alone(sheet, videos, descriptions, faults)
+    _one_spelling(sheet, videos, faults)
+    faults.raise_if_any()
+    rows = zip(videos, hazard_ids, labels, descriptions, tracks, firsts, lasts, strict=True)
+    return sorted((TruthHazard(*row) for row in rows), key=lambda row: (row.video_id, row.hazard_id))
+
+
+def _column(
+    sheet: Sheet, name: str, check: Callable[[Any], Any], faults: Faults, missing: Any = _BAD
+) -> list[Any]:
+    """The clean values of a column, `_BAD` where a fault was noted.
+
+    A cell that holds nothing becomes `missing`; left at `_BAD`, the column is required and `check`
+    words the fault. Equal texts are checked once: many captions and ids are repeated.
+    """
+    cells = sheet.cells.get(name)
+    if cells is None:
+        return [_BAD if name in faults.kept else missing] * len(sheet.rows)
+    seen: dict[str, Any] = {}
+    clean: list[Any] = []
+    for row, value in zip(sheet.rows, cells, strict=True):
+        result = seen.get(value) if isinstance(value, str) else None
+        if result is None:
+            if missing is not _BAD and is_missing(value):
+                result = missing
+            else:
+                try:
+                    result = check(value)
+                except Wrong as wrong:
+                    faults.add(row, name, wrong.found, wrong.expected, wrong.mend)
+                    result = _BAD
+            if isinstance(value, str) and result is not _BAD:
+                seen[value] = result
+        clean.append(result)
+    return clean
+
+
+def _missing_columns(sheet: Sheet, required: Sequence[str], faults: Faults) -> None:
+    spelled = {name.strip().lower().replace(" ", "_").replace("-", "_"): name for name in sheet.columns}
+    for name in required:
+        if name not in sheet.columns:
+            near = spelled.get(name)
+            found = f"the columns {', '.join(visible(column) for column in sheet.columns[:_SHOWN_IDS])}"
+            mend = f"Rename '{visible(near)}' to '{name}'." if near else "Add the column."
+            faults.add(None, name, f"no such column, but {found}", f"a column `{name}`", mend)
+
+
+def _unknown_columns(sheet: Sheet, known: Sequence[str]) -> list[str]:
+    unknown = [visible(name) for name in sheet.columns if name not in known]
+    if not unknown:
+        return []
+    return [f"Ignored unknown columns: {_some(unknown)}."]
+
+
+def _some(names: Sequence[str]) -> str:
+    rest = len(names) - _SHOWN_IDS
+    return ", ".join(names[:_SHOWN_IDS]) + (f" and {rest:,} more" if rest > 0 else "")
+
+
+def _video_check(known: set[str] | None) -> Callable[[object], str]:
+    """The check of a prediction's video id; with `known` ids, it must be one of them."""
+    if known is None:
+        return checks.safe_identifier
+    suggested = 0
+
+    def check(value: object) -> str:
+        nonlocal suggested
+        clean = checks.identifier(value, "a video id")
+        if clean in known:
+            return clean
+        near: list[str] = []
+        if suggested < _SUGGESTIONS:
+            suggested += 1
+            near = get_close_matches(clean, known, 1, 0.8)
+        mend = f"Did you mean '{near[0]}'?" if near else "Correct the id, or leave the row out."
+        raise Wrong(checks.show(value), f"one of the truth's {len(known)} video ids", mend)
+
+    return check
+
+
+def _unique(sheet: Sheet, videos: list[Any], numbers: list[Any], column: str, faults: Faults) -> None:
+    first_row: dict[tuple[Any, Any], int] = {}
+    for row, key in zip(sheet.rows, zip(videos, numbers, strict=True), strict=True):
+        before = first_row.setdefault(key, row)
+        if before != row and _BAD not in key:
+            again = f"{column} '{visible(str(key[1]))}' again"
+            found = f"{again} in video '{visible(key[0])}' (first in row {before})"
+            faults.add(row, column, found, f"each {column} once in a video", "Renumber or remove the row.")
+
+
+def _no_hazard_alone(sheet: Sheet, videos: list[Any], descriptions: list[Any], faults: Faults) -> None:
+    rows_of: dict[str, list[tuple[int, bool]]] = {}
+    for row, video, text in zip(sheet.rows, videos, descriptions, strict=True):
+        if video is not _BAD and text is not _BAD:
+            rows_of.setdefault(video, []).append((row, text == ""))
+    for video, rows in rows_of.items():
+        if len(rows) > 1:
+            for row in [row for row, is_no_hazard in rows if is_no_hazard]:
+                found = f"a no-hazard row, but {len(rows)} rows for video '{video}'"
+                mend = "Describe the hazard, or leave one of the rows out."
+                faults.add(row, "description", found, "one row for a video without hazard", mend)
+
+
+def _one_spelling(sheet: Sheet, videos: list[Any], faults: Faults) -> None:
+    """Ids that differ only in case would name one page on many file systems."""
+    spelled: dict[str, str] = {}
+    for row, video in zip(sheet.rows, videos, strict=True):
+        if video is not _BAD:
+            before = spelled.setdefault(video.lower(), video)
+            if before != video:
+                found = f"'{video}' beside '{before}'"
+                expected = "video ids that differ in more than case"
+                faults.add(row, "video_id", found, expected, "Rename one of them.")
+
+
+def _missing_videos(predictions: Sequence[Prediction], truth: Iterable[TruthHazard]) -> list[str]:
+    predicted = {prediction.video_id for prediction in predictions}
+    with_hazard = {hazard.video_id for hazard in truth if not hazard.is_no_hazard}
+    missing = sorted(with_hazard - predicted)
+    if not missing:
+        return []
+    return [
+        f"{len(missing)} of {len(with_hazard)} videos with a hazard have no prediction and count as 0: "
+        f"{_some(missing)}."
+    ]

@@ -1,0 +1,206 @@
+"""A file's bytes as a sheet of raw cells: CSV, JSON Lines or Parquet, told apart by content.
+
+Bounds come before parsing: bytes, rows, and for Parquet what its pages would unpack to.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.files import sha256_of
+from sitegen.checks import Faults, visible
+from sitegen.formats import MAX_BYTES, bounded_bytes, format_of
+
+MAX_ROWS = 2_000_000
+MAX_UNPACKED_BYTES = 4 * 2**30
+MAX_VALUES = 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """Raw cells by known column, each column as long as `rows`, the 1-based row numbers.
+
+    CSV numbers its data rows (the header and blank lines are not counted), JSON Lines its lines,
+    Parquet its rows. `columns` names every column that the file has, `metadata` holds a Parquet
+    file's text marks.
+    """
+
+    columns: tuple[str, ...]
+    rows: Sequence[int]
+    cells: dict[str, list[Any]]
+    metadata: dict[str, str] = field(default_factory=dict)
+
+
+def load(path: Path, known: Sequence[str], faults: Faults) -> tuple[Sheet, str, str]:
+    """The sheet of a file, its format and its SHA-256; cells that cannot be read go to `faults`.
+
+    Raises FaultsError at once when the file as a whole cannot be read.
+    """
+    data = bounded_bytes(path, faults)
+    source_format = format_of(data, path, faults)
+    parse: dict[str, Callable[[bytes, Sequence[str], Faults], Sheet]] = {
+        "csv": _csv,
+        "jsonl": _jsonl,
+        "parquet": _parquet,
+    }
+    return parse[source_format](data, known, faults), source_format, sha256_of(data)
+
+
+def _csv(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
+    # Bytes that are not UTF-8 pass as surrogates here and become faults of their own cells.
+    source = io.StringIO(data.decode("utf-8-sig", "surrogateescape"), newline="")
+    before = csv.field_size_limit(MAX_BYTES)
+    header: list[str] = []
+    lines: list[list[str]] = []
+    try:
+        reader = csv.reader(source, strict=True)
+        for line in reader:
+            if not line:
+                continue
+            if not header:
+                header = [name.strip() for name in line]
+            elif len(lines) == MAX_ROWS:
+                _too_many_rows(faults)
+            else:
+                lines.append(line)
+    except csv.Error as error:
+        expected = 'cells between commas, quoted with " where they hold commas, quotes or line ends'
+        mend = f"Line {reader.line_num}: close the quote, or double quotes inside quotes."
+        faults.add(len(lines) + 1 if header else None, None, str(error), expected, mend)
+    finally:
+        csv.field_size_limit(before)
+    _header_hints(header, known, faults)
+    rows = []
+    kept = []
+    for number, line in enumerate(lines, start=1):
+        if len(line) == len(header):
+            rows.append(number)
+            kept.append(line)
+        else:
+            found = f"{len(line)} cells"
+            mend = 'Quote a cell that holds a comma: "a cat, running".'
+            faults.add(number, None, found, f"{len(header)} cells, as in the header", mend)
+    places = {name: header.index(name) for name in known if name in header}
+    cells = {name: [line[place] for line in kept] for name, place in places.items()}
+    return Sheet(tuple(header), rows, cells)
+
+
+def _header_hints(header: Sequence[str], known: Sequence[str], faults: Faults) -> None:
+    for name in sorted({name for name in known if header.count(name) > 1}):
+        faults.add(None, name, f"{header.count(name)} columns of this name", "one", "Remove or rename one.")
+    if len(header) == 1:
+        for sign, word in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
+            if sign in header[0]:
+                mend = "Export the table with commas between the cells."
+                faults.stop(f"{word} between the cells", "commas", mend)
+
+
+def _too_many_rows(faults: Faults) -> None:
+    faults.stop(f"more than {MAX_ROWS:,} rows", f"at most {MAX_ROWS:,}", "Leave out some predictions.")
+
+
+def _jsonl(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
+    rows: list[int] = []
+    records: list[dict[str, Any]] = []
+    names: dict[str, None] = {}
+    expected = "one JSON object a line"
+    for number, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").split(b"\n"), start=1):
+        if not line.strip():
+            continue
+        if len(records) == MAX_ROWS:
+            _too_many_rows(faults)
+        try:
+            record = json.loads(line.decode("utf-8"))
+        except UnicodeDecodeError as error:
+            found = f"byte {line[error.start]:#04x} at position {error.start + 1}, which is not UTF-8"
+            faults.add(number, None, found, "text in UTF-8", "Save the file as UTF-8.")
+        except json.JSONDecodeError as error:
+            found = f"{error.msg} at character {error.pos + 1} of '{visible(error.doc)}'"
+            faults.add(number, None, found, expected, "Mend the line, or write it with a JSON library.")
+        except (ValueError, RecursionError) as error:
+            found = f"JSON that cannot be read ({visible(str(error))})"
+            faults.add(number, None, found, expected, "Mend the line.")
+        else:
+            if isinstance(record, dict):
+                rows.append(number)
+                records.append(record)
+                names.update(dict.fromkeys(record))
+            else:
+                faults.add(number, None, f"a JSON {type(record).__name__}", expected, "Use {...}.")
+    cells = {name: [record.get(name) for record in records] for name in known if name in names}
+    return Sheet(tuple(names), rows, cells)
+
+
+def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
+    try:
+        metadata = pq.read_metadata(pa.BufferReader(data))
+        paths = {place: metadata.schema.column(place).path for place in range(len(metadata.schema))}
+        wanted = [place for place, leaf in paths.items() if leaf.split(".")[0] in known]
+        _parquet_bounds(metadata, wanted, faults)
+        # Texts stay dictionaries, so that a small file does not unpack to a huge one.
+        texts = [
+            paths[place] for place in wanted if metadata.schema.column(place).physical_type == "BYTE_ARRAY"
+        ]
+        with pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts) as file:
+            names = file.schema_arrow.names
+            marks = {_text(key): _text(value) for key, value in (file.schema_arrow.metadata or {}).items()}
+            for name in sorted({name for name in known if names.count(name) > 1}):
+                faults.stop(f"{names.count(name)} columns `{name}`", "one", "Remove or rename one.")
+            table = file.read(columns=[name for name in known if name in names])
+    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
+        found = f"a damaged Parquet file ({visible(str(error), 200)})"
+        faults.stop(found, "a Parquet file", "Write it again.")
+    cells = {name: _unpack(table.column(name)) for name in table.column_names}
+    return Sheet(tuple(names), range(1, table.num_rows + 1), cells, marks)
+
+
+def _text(mark: bytes) -> str:
+    return mark.decode("utf-8", "replace")
+
+
+def _parquet_bounds(metadata: pq.FileMetaData, wanted: Sequence[int], faults: Faults) -> None:
+    if metadata.num_rows > MAX_ROWS:
+        _too_many_rows(faults)
+    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
+    chunks = [[group.column(place) for group in groups] for place in wanted]
+    unpacked = sum(chunk.total_uncompressed_size for column in chunks for chunk in column)
+    values = max((sum(chunk.num_values for chunk in column) for column in chunks), default=0)
+    if unpacked > MAX_UNPACKED_BYTES or values > MAX_VALUES:
+        found = f"{unpacked:,} bytes and up to {values:,} values in a column, unpacked"
+        expected = f"at most {MAX_UNPACKED_BYTES:,} bytes and {MAX_VALUES:,} values"
+        faults.stop(found, expected, "Leave out some predictions.")
+
+
+def _unpack(column: pa.ChunkedArray) -> list[Any]:
+    """An Arrow column as Python values; repeated texts of a dictionary are one object."""
+    values: list[Any] = []
+    for chunk in column.chunks:
+        if isinstance(chunk, pa.DictionaryArray):
+            distinct = [*_plain(chunk.dictionary), None]
+            values += [distinct[place] for place in chunk.indices.fill_null(len(distinct) - 1).to_pylist()]
+        else:
+            values += _plain(chunk)
+    return values
+
+
+def _plain(chunk: pa.Array) -> list[Any]:
+    try:
+        return list(chunk.to_pylist())
+    except (ValueError, OverflowError):  # text that is not UTF-8, a time out of range
+        return [_value(scalar) for scalar in chunk]
+
+
+def _value(scalar: pa.Scalar) -> Any:
+    try:
+        return scalar.as_py()
+    except UnicodeDecodeError as error:
+        return error.object.decode("utf-8", "surrogateescape")
+    except (ValueError, OverflowError) as error:
+        return error

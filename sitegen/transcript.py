@@ -1,0 +1,131 @@
+"""What every stage of a system said about a video, and how its verification went."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+
+from pipeline.records import Exclusion, Kind, Match, Snippet, Stage, StageOutput, TrackBox
+from sitegen.contexts import Saying, StageView, TrackCheck, Transcript
+from sitegen.numerals import plural, score
+from sitegen.gathered import System
+from sitegen.words import shorten, visible
+
+STAGES: dict[Stage, tuple[str, str]] = {
+    Stage.SCENE: ("Scene descriptions", "Track 1: what the vision agent saw in each keyframe"),
+    Stage.RHS: ("Ranked Hazards Set", "Track 1: hazards in those descriptions, most hazardous first"),
+    Stage.ANSWER: ("Video answers", "Track 2: the objects on the road, asked again and again"),
+    Stage.CHUNKS: ("Noun chunks", "Track 2: the nouns in each answer"),
+    Stage.AES: ("All Elements Set", "Track 2: the best list of elements"),
+    Stage.COS: ("Critical Object Set", "Cross-reference: ranked hazards that both tracks know"),
+    Stage.AOS: ("Anomalous Object Set", "Anomaly: the hazards that are the final captions"),
+}
+_MAX_REPLY = 4_000
+_MAX_LABELS = 6
+
+
+def transcript(system: System, video_id: str, boxes: Sequence[TrackBox]) -> Transcript | None:
+    """The records of a system on a video, or None when it left none."""
+    records = system.records.get(video_id)
+    if records is None:
+        return None
+    error = records.outcome.error if records.outcome else ""
+    if not (records.stages or records.snippets or error):
+        return None
+    hazards = {box.track_id for box in boxes if box.kind is Kind.CHALLENGE}
+    stages = tuple(
+        _stage(stage, [output for output in records.stages if output.stage is stage])
+        for stage in STAGES
+        if any(output.stage is stage for output in records.stages)
+    )
+    tracks = _tracks(records.snippets, records.matches, hazards)
+    counted = sum(snippet.excluded is None for snippet in records.snippets)
+    summary = f"{plural(len(records.stages), 'call')} in {plural(len(stages), 'stage')}"
+    if records.snippets:
+        summary += f", {counted:,} of {plural(len(records.snippets), 'snippet')} verified"
+    return Transcript(
+        system.slug,
+        visible(system.name),
+        summary,
+        stages,
+        tracks,
+        _tracks_summary(records.snippets),
+        visible(error),
+    )
+
+
+def _stage(stage: Stage, outputs: Sequence[StageOutput]) -> StageView:
+    name, meaning = STAGES[stage]
+    models = dict.fromkeys(output.reply.model for output in outputs)
+    prompts = dict.fromkeys(output.prompt_id for output in outputs if output.prompt_id)
+    return StageView(
+        str(stage),
+        name,
+        meaning,
+        visible(", ".join(models)),
+        visible(", ".join(prompts)),
+        plural(len(outputs), "call"),
+        tuple(
+            _saying(list(run)) for _, run in groupby(outputs, lambda o: (o.reply.text, o.items, str(o.parse)))
+        ),
+    )
+
+
+def _saying(run: Sequence[StageOutput]) -> Saying:
+    first, last = run[0], run[-1]
+    if first.frame_index is not None:
+        where = f"frame {first.frame_index}"
+        if last.frame_index != first.frame_index:
+            where = f"frames {first.frame_index}–{last.frame_index}"
+    else:
+        where = f"call {first.call + 1}"
+        if last.call != first.call:
+            where = f"calls {first.call + 1}–{last.call + 1}"
+    items = tuple(
+        (visible(item.label), "" if item.description == item.label else visible(item.description))
+        for item in first.items
+    )
+    reply = visible(shorten(first.reply.text, _MAX_REPLY))
+    spoken = {first.reply.text.strip(), first.reply.text.strip().rstrip(".")}
+    if len(items) == 1 and {first.items[0].label, first.items[0].description} & spoken:
+        items = ()
+    return Saying(where, f"×{len(run)}" if len(run) > 1 else "", items, reply, str(first.parse))
+
+
+def _tracks(
+    snippets: Iterable[Snippet], matches: Iterable[Match], hazards: set[str]
+) -> tuple[TrackCheck, ...]:
+    by_track: dict[str, list[Snippet]] = {}
+    for snippet in snippets:
+        by_track.setdefault(snippet.track_box.track_id, []).append(snippet)
+    found: dict[str, list[Match]] = {}
+    for match in matches:
+        found.setdefault(match.track_id, []).append(match)
+    order = sorted(by_track, key=lambda track: (track not in hazards, track not in found, track))
+    return tuple(_track(track, by_track[track], found.get(track, []), track in hazards) for track in order)
+
+
+def _track(track: str, snippets: Sequence[Snippet], matches: Sequence[Match], hazard: bool) -> TrackCheck:
+    reasons = Counter(snippet.excluded for snippet in snippets if snippet.excluded is not None)
+    counted = len(snippets) - reasons.total()
+    best = max(matches, key=lambda match: (match.cosine, match.label), default=None)
+    detected = Counter(match.label for match in matches if match.detected)
+    anomalous = dict.fromkeys(match.label for match in matches if match.detected and match.in_aos)
+    return TrackCheck(
+        shorten(visible(track), 24),
+        hazard,
+        f"{counted} of {len(snippets)}",
+        ", ".join(f"{reasons[reason]} {reason}" for reason in Exclusion if reason in reasons),
+        shorten(visible(best.label), 60) if best else "",
+        score(best.cosine, digits=3) if best else None,
+        ", ".join(f"{shorten(visible(n), 40)} ×{c}" for n, c in detected.most_common(_MAX_LABELS)),
+        ", ".join(shorten(visible(label), 60) for label in anomalous),
+    )
+
+
+def _tracks_summary(snippets: Sequence[Snippet]) -> str:
+    if not snippets:
+        return ""
+    reasons = Counter(snippet.excluded for snippet in snippets if snippet.excluded is not None)
+    text = f"{plural(len(snippets), 'snippet')} considered, {len(snippets) - reasons.total():,} compared"
+    parts = [f"{reasons[reason]:,} {reason}" for reason in Exclusion if reason in reasons]
+    return f"{text}; left out: {', '.join(parts)}." if parts else f"{text}; none left out."
