@@ -41,17 +41,25 @@ def submit_file(
         extras = {table.name: file / f"{table.name}.parquet" for table in EXTRAS}
         extras = {key: extra for key, extra in extras.items() if extra.is_file()}
         agents = agents or metadata(path).get("agents", "")
-    stored = store(benchmark.submissions, name, authors, url, date, agents, read, path, extras, replace=replace)
-    evaluation = evaluate(
-        stored.submission, truth, open_embedder(), benchmark.settings.threshold, truth_sha256(truth)
+    folder = store(
+        benchmark.submissions,
+        name=name,
+        authors=authors,
+        url=url,
+        date=date,
+        agents=agents,
+        read=read,
+        original=path,
+        extras=extras,
+        replace=replace,
     )
-    return stored, evaluation
+    return next((one, score) for one, score in evaluate_board(benchmark) if one.folder == folder)
 
 
 def evaluate_board(benchmark: Benchmark) -> list[tuple[StoredSubmission, Evaluation]]:
     """Every submission on the board with its scores; each distinct text is embedded once."""
     truth = read_truth(benchmark.truth)
-    stored = load_all(benchmark.submissions)
+    stored = load_all(benchmark.submissions, truth)
     embedder = open_embedder()
     vectors = embed_all(texts_of([one.submission for one in stored], truth), embedder)
     key = truth_sha256(truth)

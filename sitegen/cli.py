@@ -118,7 +118,8 @@ def _print_board(evaluations: "list[Evaluation]") -> None:
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("rank", "submission", "BESM", "SAM", "detection", "hazard recall", "videos"):
-        table.add_column(heading, justify="left" if heading == "submission" else "right")
+        left = heading == "submission"
+        table.add_column(heading, justify="left" if left else "right", overflow="fold" if left else "ellipsis")
     for row in rank(evaluations, "besm"):
         card = row.evaluation.card
         recall = "-" if card.hazard_recall is None else f"{card.hazard_recall:.4f}"

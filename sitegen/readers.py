@@ -188,7 +188,7 @@ def _unique(sheet: Sheet, videos: list[Any], numbers: list[Any], column: str, fa
     first_row: dict[tuple[Any, Any], int] = {}
     for row, key in zip(sheet.rows, zip(videos, numbers, strict=True), strict=True):
         before = first_row.setdefault(key, row)
-        if before != row and _BAD not in key:
+        if before != row and _BAD not in key and key[1] != "":
             again = f"{column} '{visible(str(key[1]))}' again"
             found = f"{again} in video '{visible(key[0])}' (first in row {before})"
             faults.add(row, column, found, f"each {column} once in a video", "Renumber or remove the row.")
