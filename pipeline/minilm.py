@@ -46,17 +46,45 @@ _SETTINGS = ("num_attention_heads", "layer_norm_eps", "hidden_act", "model_type"
 _DEFAULT_MAX_TOKENS = 256  # sentence_bert_config.json of all-MiniLM-L6-v2
 
 
-def _read_json(root: Path, name: str) -> dict[str, Any]:
-    """A JSON object of the model; empty when the file is not there."""
+def _read_json(root: Path, name: str, kind: type = dict) -> Any:
+    """A JSON object (or list: `kind`) of the model; empty when the file is not there."""
     if not has_model_file(root, name):
-        return {}
+        return kind()
     try:
         value = json.loads(read_model_file(root, name, MAX_JSON_BYTES))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{root}/{name}: found no JSON; expected a JSON object. Check the model.") from error
-    if not isinstance(value, dict):
-        raise InputError(f"{root}/{name}: found another value; expected a JSON object. Check the model.")
+        raise InputError(f"{root}/{name}: found no JSON; expected a JSON {kind.__name__}.") from error
+    if not isinstance(value, kind):
+        raise InputError(f"{root}/{name}: found another value; expected a JSON {kind.__name__}.")
     return value
+
+
+def _max_tokens(root: Path) -> int:
+    """Where texts are cut. sentence-transformers kept it in its own file, and since 6 in the tokenizer's."""
+    for file, key in (
+        ("sentence_bert_config.json", "max_seq_length"),
+        ("tokenizer_config.json", "model_max_length"),
+    ):
+        config = _read_json(root, file)
+        if key in config:
+            return number(config, key, 4, 8192, f"{root}/{file}")
+    return _DEFAULT_MAX_TOKENS
+
+
+def _check_modules(root: Path) -> None:
+    """Raise InputError when a model is more than a transformer, mean pooling and normalisation."""
+    where = f"{root}/1_Pooling/config.json"
+    pooling = _read_json(root, "1_Pooling/config.json")
+    expect(pooling, {"pooling_mode": "mean"}, where)
+    for mode in ("cls_token", "max_tokens", "mean_sqrt_len_tokens", "weightedmean_tokens", "lasttoken"):
+        expect(pooling, {f"pooling_mode_{mode}": False}, where)
+    modules = [module for module in _read_json(root, "modules.json", list) if isinstance(module, dict)]
+    kinds = [str(module.get("type")).rpartition(".")[2] for module in modules]
+    if not set(kinds) <= {"Transformer", "Pooling", "Normalize"}:
+        raise InputError(
+            f"{root}/modules.json: found {', '.join(kinds)}; expected Transformer, Pooling and Normalize. "
+            "This embedder is not supported."
+        )
 
 
 class OnnxEmbedder:
@@ -86,11 +114,8 @@ class OnnxEmbedder:
             )
         self._weights_name = weights
         self._config = _read_json(root, "config.json")
-        pooling = _read_json(root, "1_Pooling/config.json")
-        for mode in ("cls_token", "max_tokens", "mean_sqrt_len_tokens", "weightedmean_tokens", "lasttoken"):
-            expect(pooling, {f"pooling_mode_{mode}": False}, f"{root}/1_Pooling/config.json")
-        sentence = {"max_seq_length": _DEFAULT_MAX_TOKENS} | _read_json(root, "sentence_bert_config.json")
-        self._max_tokens = number(sentence, "max_seq_length", 4, 8192, f"{root}/sentence_bert_config.json")
+        self._max_tokens = _max_tokens(root)
+        _check_modules(root)
         limit = self._config.get("max_position_embeddings")
         if type(limit) is int and limit >= 4:
             self._max_tokens = min(self._max_tokens, limit)

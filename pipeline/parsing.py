@@ -124,7 +124,7 @@ def _walk(value: Any) -> Iterable[tuple[str, str]]:
 
 
 def _split_pair(text: str) -> tuple[str, str]:
-    """"Cat: crossing the road" -> its two parts; a text without a separator is all label.
+    """ "Cat: crossing the road" -> its two parts; a text without a separator is all label.
 
     A long text without a separator is a sentence, so it is all description.
     """
@@ -138,9 +138,9 @@ def _split_pair(text: str) -> tuple[str, str]:
 def _ranked(pairs: Iterable[tuple[str, str]]) -> tuple[Item, ...]:
     items: list[Item] = []
     seen: set[tuple[str, str]] = set()
-    for label, description in pairs:
-        label = " ".join(label.split())[:MAX_LABEL_CHARS]
-        description = " ".join(description.split())[:MAX_DESCRIPTION_CHARS]
+    for raw_label, raw_description in pairs:
+        label = " ".join(raw_label.split())[:MAX_LABEL_CHARS]
+        description = " ".join(raw_description.split())[:MAX_DESCRIPTION_CHARS]
         key = (label.casefold(), description.casefold())
         if not (any(c.isalnum() for c in label) or any(c.isalnum() for c in description)) or key in seen:
             continue

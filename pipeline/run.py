@@ -69,7 +69,9 @@ def find_videos(folder: Path) -> list[Path]:
         raise InputError(f"{folder}: no such folder; expected a folder of video files (--videos).")
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
     faults = [
-        Fault(str(path), None, None, f"the file name {path.name!r}", "a stem of A-Z a-z 0-9 . _ -", "Rename it.")
+        Fault(
+            str(path), None, None, f"the file name {path.name!r}", "a stem of A-Z a-z 0-9 . _ -", "Rename it."
+        )
         for path in paths
         if not SAFE_ID.fullmatch(path.stem)
     ]
@@ -98,8 +100,7 @@ def agent_names(config: RunConfig) -> str:
     """One line that says which agents a configuration uses; goes into files and onto pages."""
     track2 = "" if config.track2.enabled else "; without Track 2"
     return (
-        f"{EmbeddedVisionAgent.name}; {EmbeddedLanguageAgent.name}; "
-        f"ConSE baseline in place of CLIP{track2}"
+        f"{EmbeddedVisionAgent.name}; {EmbeddedLanguageAgent.name}; ConSE baseline in place of CLIP{track2}"
     )
 
 
@@ -253,7 +254,9 @@ def predict(
         rows = [row for run in runs for row in run.tables[table.name]]
         table.write(out / f"{table.name}.parquet", rows, marks)
     outcomes = tuple(sorted((run.outcome for run in runs), key=lambda outcome: outcome.video_id))
-    return RunReport(outcomes, sum(run.reused for run in runs), sum(len(run.tables["predictions"]) for run in runs))
+    return RunReport(
+        outcomes, sum(run.reused for run in runs), sum(len(run.tables["predictions"]) for run in runs)
+    )
 
 
 def _stream(executor: Executor, jobs: Sequence[Job]) -> Iterator[VideoRun]:

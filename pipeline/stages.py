@@ -28,7 +28,9 @@ class Agents:
     language: LanguageAgent
 
 
-def run_stages(video_id: str, frames: Sequence[Frame], agents: Agents, config: RunConfig) -> list[StageOutput]:
+def run_stages(
+    video_id: str, frames: Sequence[Frame], agents: Agents, config: RunConfig
+) -> list[StageOutput]:
     """Every stage output of a video, in order; the last is the AOS.
 
     Without Track 2 the RHS takes the place of the COS (ours), and no AES or COS is made.

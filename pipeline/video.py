@@ -3,7 +3,7 @@
 A header's frame count is only a claim, so it is never used to choose the frames.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import av
 import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError, InvalidDataError
+from av.video.reformatter import VideoReformatter
 
 from pipeline.errors import VideoError
 from pipeline.records import Box, Frame, RgbImage, Video
@@ -64,22 +65,104 @@ def _open(path: Path) -> InputContainer:
 
 
 @dataclass(frozen=True, slots=True)
-class _Pass:
-    """What one decode to the end found; `rgb` holds (time in s, picture) of the wanted frames."""
+class _Index:
+    """What a file's packets say without decoding: `order` maps a presentation time to its frame."""
+
+    packets: int
+    order: Mapping[int, int]
+    claimed: int
+    fps_hz: float
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether every packet has a presentation time of its own."""
+        return len(self.order) == self.packets
+
+
+@dataclass(frozen=True, slots=True)
+class _Decoded:
+    """What decoding found; `rgb` holds (time in s, picture) of the wanted frames."""
 
     rgb: dict[int, tuple[float, RgbImage]]
     total: int
     broken_packets: int
 
 
-def _decode(path: Path, wanted: Collection[int]) -> _Pass:
+class _Reader:
+    """Takes frames of one size, and the pictures of those that are wanted."""
+
+    def __init__(self, path: Path, wanted: Collection[int]) -> None:
+        self.rgb: dict[int, tuple[float, RgbImage]] = {}
+        self._path = path
+        self._wanted = wanted
+        self._size: tuple[int, int] | None = None
+        # One for all frames: each new one would set up the colour conversion again.
+        self._reformatter = VideoReformatter()
+
+    def take(self, index: int, frame: av.VideoFrame) -> None:
+        found = (frame.width, frame.height)
+        if self._size is None:
+            self._size = found
+        if found != self._size:
+            raise VideoError(
+                f"{self._path}: the frame size changes from {self._size[0]}x{self._size[1]} to "
+                f"{found[0]}x{found[1]} px at frame {index}; boxes are in pixels of one size. "
+                "Re-encode the clip."
+            )
+        if max(found) > MAX_SIDE_PX:
+            raise VideoError(f"{self._path}: frames of {found[0]}x{found[1]} px are too large.")
+        if index in self._wanted:
+            picture = np.asarray(
+                self._reformatter.reformat(frame, format="rgb24").to_ndarray(), dtype=np.uint8
+            )
+            turns = round(frame.rotation / 90) % 4
+            upright = np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture
+            self.rgb[index] = (frame.time or 0.0, upright)
+
+
+def _read_index(path: Path) -> _Index:
+    with _open(path) as container:
+        stream = container.streams.video[0]
+        rate = stream.average_rate or stream.guessed_rate
+        times = [packet.pts for packet in container.demux(stream) if packet.size]
+        known = sorted({time for time in times if time is not None})
+        order = {time: index for index, time in enumerate(known)}
+        return _Index(len(times), order, stream.frames, float(rate) if rate else 0.0)
+
+
+def _decode_wanted(path: Path, index: _Index, wanted: Collection[int]) -> _Decoded | None:
+    """Decode what the wanted frames need and no more; None when the file is not what it seems.
+
+    Frames that no other frame refers to are skipped by the decoder unless they are wanted.
+    """
+    reader = _Reader(path, wanted)
+    with _open(path) as container:
+        stream = container.streams.video[0]
+        context = stream.codec_context
+        context.thread_count = 1
+        try:
+            for packet in container.demux(stream):
+                place = None if packet.pts is None else index.order.get(packet.pts)
+                skippable = packet.size and place is not None and place not in wanted
+                context.skip_frame = "NONREF" if skippable else "DEFAULT"
+                for frame in packet.decode():
+                    at = None if frame.pts is None else index.order.get(frame.pts)
+                    if at is None or frame.is_corrupt:
+                        return None
+                    reader.take(at, frame)
+        except InvalidDataError:
+            return None
+    return _Decoded(reader.rgb, index.packets, 0) if len(reader.rgb) == len(wanted) else None
+
+
+def _decode_all(path: Path, wanted: Collection[int]) -> _Decoded:
+    """Decode everything there is, past damaged places, and count the frames as they come."""
+    reader = _Reader(path, wanted)
+    total = broken = 0
     with _open(path) as container:
         stream = container.streams.video[0]
         # One decoder thread: clips run in parallel, and the frames are the same anyway.
         stream.codec_context.thread_count = 1
-        rgb: dict[int, tuple[float, RgbImage]] = {}
-        size: tuple[int, int] | None = None
-        total = broken = 0
         for packet in container.demux(stream):
             try:
                 frames = packet.decode()
@@ -87,65 +170,45 @@ def _decode(path: Path, wanted: Collection[int]) -> _Pass:
                 broken += 1
                 continue
             for frame in frames:
-                found = (frame.width, frame.height)
-                if size is None:
-                    size = found
-                if found != size:
-                    raise VideoError(
-                        f"{path}: the frame size changes from {size[0]}x{size[1]} to {found[0]}x{found[1]} "
-                        f"px at frame {total}; boxes are in pixels of one size. Re-encode the clip."
-                    )
-                if max(found) > MAX_SIDE_PX:
-                    raise VideoError(f"{path}: frames of {found[0]}x{found[1]} px are too large.")
-                if total in wanted:
-                    picture = np.asarray(frame.to_ndarray(format="rgb24"), dtype=np.uint8)
-                    turns = round(frame.rotation / 90) % 4
-                    upright = np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture
-                    rgb[total] = (frame.time or 0.0, upright)
+                reader.take(total, frame)
                 total += 1
-        return _Pass(rgb, total, broken)
-
-
-def _count_packets(path: Path) -> tuple[int, int, float]:
-    """Packets that carry video, frames by the header (0: not stated), fps (0: not stated)."""
-    with _open(path) as container:
-        stream = container.streams.video[0]
-        rate = stream.average_rate or stream.guessed_rate
-        packets = sum(1 for packet in container.demux(stream) if packet.size)
-        return packets, stream.frames, float(rate) if rate else 0.0
+    return _Decoded(reader.rgb, total, broken)
 
 
 def read_keyframes(path: Path, video_id: str, count: int = 25) -> Keyframes:
-    """The `count` frames of `frame_indices`, exact, in one sequential decode.
+    """The `count` frames of `frame_indices`, exact, in one sequential pass over the file.
 
-    Packets are counted first (without decoding), since a header's frame count is only a claim;
-    a second decode happens only when packets and decoded frames differ. Raises VideoError when
-    the file is missing, empty, not decodable, or changes its frame size.
+    Packets are counted first (without decoding), since a header's frame count is only a claim.
+    A file whose packets cannot be trusted (no times, damage) is decoded whole, and the frames are
+    chosen from what comes out. Raises VideoError when the file is missing, empty, not decodable,
+    or changes its frame size.
     """
     try:
-        packets, claim, fps_hz = _count_packets(path)
-        indices = frame_indices(packets, count)
-        decoded = _decode(path, set(indices))
-        if decoded.total != packets:
-            indices = frame_indices(decoded.total, count)
-            decoded = _decode(path, set(indices))
+        index = _read_index(path)
+        indices = frame_indices(index.packets, count)
+        decoded = _decode_wanted(path, index, set(indices)) if index.is_sound else None
+        if decoded is None:
+            decoded = _decode_all(path, set(indices))
+            if decoded.total != index.packets:
+                indices = frame_indices(decoded.total, count)
+                decoded = _decode_all(path, set(indices))
     except FFmpegError as error:
         raise VideoError(f"{path}: decoding failed: {error}. Copy the file again.") from error
     if decoded.total == 0:
         raise VideoError(f"{path}: it holds no frame that can be decoded. Copy the file again.")
     notes = []
-    if claim and claim != decoded.total:
-        notes.append(f"the header claims {claim} frames, {decoded.total} were decoded")
+    if index.claimed and index.claimed != decoded.total:
+        notes.append(f"the header claims {index.claimed} frames, {decoded.total} were decoded")
     if decoded.broken_packets:
         notes.append(f"{decoded.broken_packets} packets could not be decoded")
+    fps_hz = index.fps_hz
     if not 0 < fps_hz < 10_000:
         fps_hz = 0.0
         notes.append("the header states no frame rate")
     start_s, first = decoded.rgb[indices[0]]
     height_px, width_px = first.shape[:2]
     frames = tuple(
-        Frame(video_id, index, max(0.0, decoded.rgb[index][0] - start_s), decoded.rgb[index][1])
-        for index in indices
+        Frame(video_id, at, max(0.0, decoded.rgb[at][0] - start_s), decoded.rgb[at][1]) for at in indices
     )
     video = Video(video_id, path, decoded.total, fps_hz, width_px, height_px)
     return Keyframes(video, frames, "; ".join(notes))

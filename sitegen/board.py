@@ -69,9 +69,7 @@ def evaluate_board(benchmark: Benchmark) -> list[tuple[StoredSubmission, Evaluat
     ]
 
 
-def build_board(
-    benchmark: Benchmark, out: Path, bar: "Progress"
-) -> tuple[Sequence[Evaluation], BuildReport]:
+def build_board(benchmark: Benchmark, out: Path, bar: "Progress") -> tuple[Sequence[Evaluation], BuildReport]:
     """Score every submission and build the site into `out`."""
     board = evaluate_board(benchmark)
     report = build_site(benchmark, out, board, bar)

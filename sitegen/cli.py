@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
-FileArgument = Annotated[Path, typer.Argument(help="Predictions: Parquet, CSV or JSON Lines, or a run folder.")]
+FileArgument = Annotated[Path, typer.Argument(help="Predictions (Parquet, CSV, JSON Lines) or a run folder.")]
 TruthOption = Annotated[
     Path | None, typer.Option(help="Truth: Parquet, CSV or JSON Lines. Default: the benchmark folder's.")
 ]
@@ -80,7 +80,7 @@ def score(
     ] = 0.80,
     as_json: JsonOption = False,
 ) -> None:
-    """Score a predictions file: BESM, SAM, detection rate, hazard recall, with the signature."""
+    """Score a predictions file: BESM, SAM, detection rate, hazard recall."""
     from pipeline.minilm import open_embedder
     from sitegen.evaluate import evaluate, truth_sha256
 
@@ -119,7 +119,7 @@ def _print_board(evaluations: "list[Evaluation]") -> None:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("rank", "submission", "BESM", "SAM", "detection", "hazard recall", "videos"):
         left = heading == "submission"
-        table.add_column(heading, justify="left" if left else "right", overflow="fold" if left else "ellipsis")
+        table.add_column(heading, justify="left" if left else "right")
     for row in rank(evaluations, "besm"):
         card = row.evaluation.card
         recall = "-" if card.hazard_recall is None else f"{card.hazard_recall:.4f}"
@@ -179,7 +179,7 @@ def withdraw(
 
 @app.command()
 def build(out: OutOption = None, as_json: JsonOption = False) -> None:
-    """Score all submissions of the benchmark folder and build the site; only what changed is written."""
+    """Score all submissions and build the site; only what changed is written."""
     from sitegen.board import build_board
 
     benchmark = _here()
@@ -222,7 +222,8 @@ def serve(
 def demo(
     out: OutOption = None,
     work: Annotated[
-        Path | None, typer.Option(help="Where the demo's folder is copied. Default: in place, or coooler-demo/.")
+        Path | None,
+        typer.Option(help="Where to copy the demo's folder. Default: in place, or coooler-demo/."),
     ] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
 ) -> None:
@@ -232,7 +233,8 @@ def demo(
     folder = out or Path("site")
     evaluations = run_demo(folder, work, workers)
     _print_board(list(evaluations))
-    console.stdout().print(f"open {folder / 'index.html'} in a browser, or: coooler serve {folder}", markup=False)
+    page = folder / "index.html"
+    console.stdout().print(f"open {page} in a browser, or: coooler serve {folder}", markup=False)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ Paths are from the site's root; `Shell.root` leads there from the page ("" or ".
 
 from dataclasses import dataclass
 
+from sitegen.blocks import Block
 from sitegen.numerals import Score
 from sitegen.words import Diff
 
@@ -45,7 +46,6 @@ class BoardRow:
     detection: Score
     recall: Score | None
     date: str
-    signature_short: str
     key: str
 
 
@@ -82,7 +82,7 @@ class Chart:
 
 @dataclass(frozen=True, slots=True)
 class VideoCard:
-    """A video in a grid; `state` is `found`, `partly`, `missed` or `none` (no hazard in the truth)."""
+    """A video in a grid; `state` is `found`, `partly`, `missed` or `clear` (no hazard in the truth)."""
 
     video_id: str
     href: str
@@ -400,5 +400,6 @@ class MethodPage:
     prompts: tuple[PromptView, ...]
     models: tuple[ModelView, ...]
     systems: tuple[tuple[str, str, str], ...]
-    attribution: tuple[str, ...]
+    attribution: tuple[Block, ...]
+    attribution_rest: tuple[Block, ...]
     verify: str

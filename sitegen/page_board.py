@@ -5,7 +5,6 @@ import io
 import json
 from collections.abc import Sequence
 
-from pipeline.files import sha256_of
 from pipeline.records import VideoScore
 from sitegen.contexts import (
     BoardRow,
@@ -18,8 +17,8 @@ from sitegen.contexts import (
     VideoCard,
     VideosPage,
 )
-from sitegen.numerals import Score, percent, plural, rate, score, seconds
 from sitegen.gathered import SiteData, System
+from sitegen.numerals import Score, percent, plural, rate, score, seconds
 from sitegen.verdicts import title_of, verdict
 from sitegen.words import visible
 
@@ -56,11 +55,6 @@ def videos_page(data: SiteData, shell: Shell) -> VideosPage:
     return VideosPage(shell, cards(data), plural(len(data.truth), "video"), f"{data.settings.threshold:.2f}")
 
 
-def signature_short(system: System) -> str:
-    """The first 8 hex digits of the signature's hash: equal signatures are equal here."""
-    return sha256_of(str(system.evaluation.card.signature).encode())[:8]
-
-
 def _row(system: System, ranks: Sequence[int]) -> BoardRow:
     card, submission = system.evaluation.card, system.evaluation.submission
     name, authors, agents = visible(system.name), visible(submission.authors), visible(system.agents)
@@ -77,7 +71,6 @@ def _row(system: System, ranks: Sequence[int]) -> BoardRow:
         rate(card.detection_rate),
         None if card.hazard_recall is None else rate(card.hazard_recall),
         visible(submission.date),
-        signature_short(system),
         f"{name} {authors} {agents}".casefold(),
     )
 
@@ -159,7 +152,7 @@ def _card(data: SiteData, video_id: str) -> VideoCard:
     found = sum(_good(system.scores[video_id]) for system in data.systems)
     labels = visible(title_of(truth))
     if not hazards:
-        state, words = "none", f"{found} of {len(data.systems)} rightly silent"
+        state, words = "clear", f"{found} of {len(data.systems)} rightly silent"
     else:
         state = "missed" if not found else "found" if found == len(data.systems) else "partly"
         words = f"{found} of {len(data.systems)} detected it"
@@ -175,7 +168,7 @@ def _card(data: SiteData, video_id: str) -> VideoCard:
         round(width * shape),
         f"A keyframe of {visible(video_id)}: {labels}",
         labels,
-        descriptions or ("The truth holds no hazard: saying nothing is right.",),
+        descriptions or ("Nothing to report: silence is right here.",),
         best,
         visible(ranked[0].name) if ranked else "",
         words if data.systems else "",

@@ -1,6 +1,7 @@
 """The method page: what the numbers mean, who made the captions, and how to check all of it."""
 
 from pipeline.prompts import templates
+from sitegen.blocks import blocks
 from sitegen.contexts import MethodPage, ModelView, PromptView, Shell
 from sitegen.gathered import SiteData
 from sitegen.words import visible
@@ -58,7 +59,11 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
         for name, part in templates().items()
     )
     systems = tuple((visible(s.name), s.slug, visible(s.agents)) for s in data.systems)
-    attribution = tuple(visible(part) for part in data.attribution.split("\n\n") if part.strip())
+    attribution = blocks("\n".join(visible(line) for line in data.attribution.splitlines()))
+    if attribution and attribution[0].kind == "heading":
+        attribution = attribution[1:]
+    short = [place for place, block in enumerate(attribution) if block.kind == "paragraph"][:1]
+    cut = short[0] + 1 if short else len(attribution)
     return MethodPage(
         shell,
         f"{data.settings.threshold:.2f}",
@@ -67,6 +72,7 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
         prompts,
         MODELS,
         systems,
-        attribution,
+        attribution[:cut],
+        attribution[cut:],
         VERIFY,
     )

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from sitegen.contexts import Extreme, Fact, Shell, SubmissionPage, VideoLine
-from sitegen.numerals import percent, plural, score
 from sitegen.gathered import SiteData, System
+from sitegen.numerals import percent, plural, score
 from sitegen.verdicts import best_pairs, title_of, verdict
 from sitegen.words import shorten, visible
 

@@ -18,8 +18,8 @@ from sitegen.contexts import (
     TruthView,
     VideoPage,
 )
-from sitegen.numerals import number, plural, score, seconds
 from sitegen.gathered import KeyframePicture, SiteData, System, VideoMedia
+from sitegen.numerals import number, plural, score, seconds
 from sitegen.verdicts import best_pairs, cosine_score, title_of, verdict
 from sitegen.words import difference, shorten, visible
 

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ def read_predictions(path: Path, truth: Iterable[TruthHazard] | None = None) -> 
     faults.raise_if_any()
 
     rows = zip(videos, ranks, descriptions, labels, tracks, frames, strict=True)
-    predictions = sorted((Prediction(*row) for row in rows), key=lambda row: (row.video_id, row.rank))
+    predictions = sorted((Prediction(*row) for row in rows), key=attrgetter("video_id", "rank"))
     warnings = _unknown_columns(sheet, PREDICTION_COLUMNS)
     if not predictions:
         warnings.append("The file holds no prediction.")
@@ -108,7 +109,7 @@ def read_truth(path: Path) -> list[TruthHazard]:
     _one_spelling(sheet, videos, faults)
     faults.raise_if_any()
     rows = zip(videos, hazard_ids, labels, descriptions, tracks, firsts, lasts, strict=True)
-    return sorted((TruthHazard(*row) for row in rows), key=lambda row: (row.video_id, row.hazard_id))
+    return sorted((TruthHazard(*row) for row in rows), key=attrgetter("video_id", "hazard_id"))
 
 
 def _column(
@@ -127,16 +128,15 @@ def _column(
     for row, value in zip(sheet.rows, cells, strict=True):
         result = seen.get(value) if isinstance(value, str) else None
         if result is None:
-            if missing is not _BAD and is_missing(value):
-                result = missing
-            else:
-                try:
-                    result = check(value)
-                except Wrong as wrong:
-                    faults.add(row, name, wrong.found, wrong.expected, wrong.mend)
-                    result = _BAD
-            if isinstance(value, str) and result is not _BAD:
+            try:
+                result = missing if missing is not _BAD and is_missing(value) else check(value)
+            except Wrong as wrong:
+                result = wrong
+            if isinstance(value, str):
                 seen[value] = result
+        if isinstance(result, Wrong):
+            faults.add(row, name, result.found, result.expected, result.mend)
+            result = _BAD
         clean.append(result)
     return clean
 

@@ -6,8 +6,8 @@ from itertools import groupby
 
 from pipeline.records import Exclusion, Kind, Match, Snippet, Stage, StageOutput, TrackBox
 from sitegen.contexts import Saying, StageView, TrackCheck, Transcript
-from sitegen.numerals import plural, score
 from sitegen.gathered import System
+from sitegen.numerals import plural, score
 from sitegen.words import shorten, visible
 
 STAGES: dict[Stage, tuple[str, str]] = {

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from pipeline.records import PairScore, TruthHazard, VideoScore
-from sitegen.numerals import Score, score
 from sitegen.gathered import System
+from sitegen.numerals import Score, score
 from sitegen.score import TOLERANCE
 from sitegen.words import shorten
 

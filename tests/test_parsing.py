@@ -56,7 +56,9 @@ def test_never_raises_and_is_bounded(text: str) -> None:
     assert bool(items) == (how not in (Parse.EMPTY, Parse.FAILED))
 
 
-@pytest.mark.parametrize("piece", ["[", "{\"a\":", "(", "<think>", "```", "1. ", "a, ", "**", "- a\n", "\\", "["])
+@pytest.mark.parametrize(
+    "piece", ["[", '{"a":', "(", "<think>", "```", "1. ", "a, ", "**", "- a\n", "\\", "["]
+)
 def test_long_answers_are_cut_and_quick(piece: str) -> None:
     start = time.process_time()
     parse(piece * (2 * MAX_ANSWER_CHARS // len(piece)))

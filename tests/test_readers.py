@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.records import Prediction, TruthHazard
@@ -179,6 +179,7 @@ RECORDS = st.lists(
 )
 
 
+@settings(deadline=None)
 @given(RECORDS)
 def test_round_trip_through_every_format(predictions: list[Prediction]) -> None:
     expected = tuple(sorted(predictions, key=lambda row: (row.video_id, row.rank)))

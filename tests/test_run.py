@@ -116,7 +116,11 @@ def test_all_stages_are_recorded_and_the_clips_differ(clips: Path, tmp_path: Pat
         stages = [output.stage for output in outputs if output.video_id == video_id]
         assert [stages.count(stage) for stage in Stage] == [4, 1, 3, 3, 1, 1, 1]
     scenes = [
-        [output.reply.text for output in outputs if (output.video_id, output.stage) == (video_id, Stage.SCENE)]
+        [
+            output.reply.text
+            for output in outputs
+            if (output.video_id, output.stage) == (video_id, Stage.SCENE)
+        ]
         for video_id in videos
     ]
     assert scenes[0] != scenes[1]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.records import Signature, VideoScore
@@ -166,6 +166,7 @@ COSINE = st.floats(-1, 1, allow_nan=False)
 COSINES = st.lists(COSINE, min_size=1, max_size=8)
 
 
+@settings(deadline=None)
 @given(COSINES, st.floats(0, 1))
 def test_scores_lie_between_worst_and_best(cosines: list[float], threshold: float) -> None:
     score = _score(*((cosine,) for cosine in cosines), threshold=threshold)
@@ -176,12 +177,14 @@ def test_scores_lie_between_worst_and_best(cosines: list[float], threshold: floa
     assert score.detected == (score.best - threshold > TOLERANCE)
 
 
+@settings(deadline=None)
 @given(COSINES.flatmap(lambda cosines: st.tuples(st.just(cosines), st.permutations(cosines))))
 def test_order_of_predictions_does_not_matter(orders: tuple[list[float], list[float]]) -> None:
     one, other = (_score(*((cosine,) for cosine in order)) for order in orders)
     assert one == other  # to the last bit
 
 
+@settings(deadline=None)
 @given(COSINE, st.integers(2, 9))
 def test_repeating_the_only_prediction_changes_nothing(cosine: float, times: int) -> None:
     once, often = _score((cosine,)), _score(*[(cosine,)] * times)
@@ -189,6 +192,7 @@ def test_repeating_the_only_prediction_changes_nothing(cosine: float, times: int
     assert once.detected == often.detected
 
 
+@settings(deadline=None)
 @given(COSINES)
 def test_a_better_prediction_never_lowers_the_best(cosines: list[float]) -> None:
     rows = [(cosine,) for cosine in cosines]
@@ -202,6 +206,7 @@ VIDEO = st.integers(0, 3).flatmap(
 )
 
 
+@settings(deadline=None)
 @given(st.lists(VIDEO, min_size=1, max_size=7))
 def test_many_videos_at_once_are_each_on_its_own(videos: list[np.ndarray]) -> None:
     """The flat computation agrees with plain Python, video by video."""

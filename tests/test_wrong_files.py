@@ -1,5 +1,6 @@
 """Files that are damaged, hostile, or something else than a table."""
 
+import gzip
 import io
 import json
 import pickle
@@ -12,7 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import FaultsError
@@ -107,7 +108,7 @@ def test_bounds_on_bytes_and_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_small_parquet_that_unpacks_to_a_huge_one(tmp_path: Path) -> None:
-    rows = 1_000_000
+    rows = 200_000
     caption = pa.array(["x" * 100_000])
     table = pa.table(
         {
@@ -115,21 +116,23 @@ def test_a_small_parquet_that_unpacks_to_a_huge_one(tmp_path: Path) -> None:
             "rank": pa.array(range(1, rows + 1)),
             "description": pa.DictionaryArray.from_arrays(pa.array([0] * rows, pa.int32()), caption),
         }
-    )  # 100 GB as plain text
+    )  # 20 GB as plain text
     pq.write_table(table, tmp_path / "p.parquet", compression="zstd")
     assert (tmp_path / "p.parquet").stat().st_size < 20 * 2**20
-    faults = faults(lambda: read_predictions(tmp_path / "p.parquet"))
-    assert len(faults) == 1001
-    assert faults[0][:2] == (1, "description")
-    assert faults[-1] == (None, None, "999,000 more faults")
+    found = faults(lambda: read_predictions(tmp_path / "p.parquet"))
+    assert len(found) == 1001
+    assert found[0][:2] == (1, "description")
+    assert found[-1] == (None, None, "199,000 more faults")
 
 
 def test_a_parquet_with_too_many_list_items(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sheets, "MAX_VALUES", 10)
-    PREDICTIONS.write(tmp_path / "p.parquet", [Prediction("v1", 1, "x", None, ("1",) * 11)])
+    monkeypatch.setattr(sheets, "MAX_LIST_BYTES", 1_000)
+    rows = [Prediction("v1", rank, "x", None, (), (7,) * 100) for rank in range(1, 11)]
+    PREDICTIONS.write(tmp_path / "p.parquet", rows)
     assert places(lambda: read_predictions(tmp_path / "p.parquet")) == [(None, None)]
 
 
+@settings(deadline=None)
 @given(st.text(max_size=100))
 def test_visible_text_is_one_printable_line(text: str) -> None:
     for shown in (visible(text), show(text)):
@@ -138,8 +141,9 @@ def test_visible_text_is_one_printable_line(text: str) -> None:
         shown.encode()
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300), st.sampled_from(["p.csv", "p.jsonl", "p.parquet", "p"]))
-def test_any_bytes_are_read_or_refused_withfaults(data: bytes, name: str) -> None:
+def test_any_bytes_are_read_or_refused_with_faults(data: bytes, name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = write(Path(folder), name, data)
         for read in (read_predictions, read_truth):
@@ -149,8 +153,9 @@ def test_any_bytes_are_read_or_refused_withfaults(data: bytes, name: str) -> Non
                 assert error.faults
 
 
+@settings(deadline=None)
 @given(st.integers(0, 10_000), st.binary(min_size=1, max_size=4))
-def test_damaged_parquet_is_read_or_refused_withfaults(place: int, patch: bytes) -> None:
+def test_damaged_parquet_is_read_or_refused_with_faults(place: int, patch: bytes) -> None:
     data = bytearray(_parquet())
     place %= len(data)
     data[place : place + len(patch)] = patch
@@ -162,8 +167,8 @@ def test_damaged_parquet_is_read_or_refused_withfaults(place: int, patch: bytes)
             assert error.faults
 
 
-def test_a_million_rows_in_seconds(tmp_path: Path) -> None:
-    n = 1_000_000
+def test_many_rows_in_seconds(tmp_path: Path) -> None:
+    n = 300_000
     table = pa.table(
         {
             "video_id": [f"v{row // 50}" for row in range(n)],
@@ -175,4 +180,4 @@ def test_a_million_rows_in_seconds(tmp_path: Path) -> None:
     start = time.process_time()
     read = read_predictions(tmp_path / "p.parquet")
     assert len(read.predictions) == n
-    assert time.process_time() - start < 20  # about 3 s; the bound is for a busy machine
+    assert time.process_time() - start < 10  # about 1 s; the bound is for a busy machine

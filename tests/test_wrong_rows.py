@@ -167,7 +167,7 @@ def test_wrong_types_in_parquet(tmp_path: Path) -> None:
 def test_columns_that_are_missing_come_together_with_the_rest(tmp_path: Path) -> None:
     path = write(tmp_path, "p.csv", "Video ID,rank,caption\nv1,0,x\n")
     found = faults(lambda: read_predictions(path))
-    assert [fault[:2] for fault in faults] == [(None, "video_id"), (None, "description"), (1, "rank")]
+    assert [fault[:2] for fault in found] == [(None, "video_id"), (None, "description"), (1, "rank")]
     with pytest.raises(FaultsError, match="Rename 'Video ID' to 'video_id'"):
         read_predictions(path)
 
@@ -191,9 +191,9 @@ def test_a_column_given_twice(tmp_path: Path) -> None:
 def test_faults_beyond_a_thousand_are_counted(tmp_path: Path) -> None:
     path = write(tmp_path, "p.csv", HEAD + "v1,0,\n" * 1500)
     found = faults(lambda: read_predictions(path))
-    assert len(faults) == 1001
-    assert faults[:2] == [(1, "rank", "'0'"), (1, "description", "an empty cell")]
-    assert faults[-1] == (None, None, "2,000 more faults")
+    assert len(found) == 1001
+    assert found[:2] == [(1, "rank", "'0'"), (1, "description", "an empty cell")]
+    assert found[-1] == (None, None, "2,000 more faults")
 
 
 def test_a_near_miss_is_suggested(tmp_path: Path) -> None:

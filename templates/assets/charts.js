@@ -44,7 +44,7 @@
       plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: "--ink" },
       hoverlabel: { bgcolor: "--surface", bordercolor: "--line-strong", font: { color: "--ink" } },
-      legend: { orientation: "h", y: -0.28, x: 0, font: { size: 12 } },
+      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 } },
     });
     window.Plotly.react(place, coloured(figure.data), coloured(layout), {
       displayModeBar: false,

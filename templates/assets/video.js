@@ -35,12 +35,17 @@
     if (boxes) stage.appendChild(boxes.cloneNode(true));
     var words = link.querySelector(".strip-text");
     text.textContent = "Frame " + words.firstChild.textContent.trim() + " · " + words.lastElementChild.textContent;
-    var strip = link.closest("ol");
+    centre(link.parentNode);
+  }
+
+  // On a phone the strip scrolls sideways.
+  function centre(item) {
+    var strip = item.parentNode;
     if (strip.scrollWidth > strip.clientWidth) {
-      var item = link.parentNode;
-      strip.scrollLeft = item.offsetLeft - strip.offsetLeft - (strip.clientWidth - item.offsetWidth) / 2;
+      strip.scrollLeft = item.offsetLeft - (strip.clientWidth - item.offsetWidth) / 2;
     }
   }
+  if (frames.length) centre(frames[current].parentNode);
 
   frames.forEach(function (link, place) {
     link.addEventListener("click", function (event) {

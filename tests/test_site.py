@@ -1,0 +1,365 @@
+"""The built site: reproducible, incremental, whole, safe with hostile text, readable without scripts."""
+
+import csv
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+from pipeline.benchmark import Benchmark
+from pipeline.records import Kind
+from sitegen import build as build_module
+from sitegen.blocks import blocks
+from sitegen.build import build_site
+from sitegen.charts import counts, label, script_json
+from sitegen.gathered import path_names
+from sitegen.media import media_from_json, media_to_json
+from sitegen.output import MANIFEST, open_output, stamped, tree_sha256
+from sitegen.serve import byte_range, find_file
+from sitegen.words import difference, shorten, visible
+from tests.site_fixtures import BIDI, EVIL, FORMULA, LONG, Board, make_benchmark, make_board
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Benchmark, Board]:
+    benchmark = make_benchmark(tmp_path_factory.mktemp("benchmark"))
+    return benchmark, make_board(benchmark)
+
+
+@pytest.fixture(scope="module")
+def site(small: tuple[Benchmark, Board], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("site")
+    build_site(small[0], out, small[1])
+    return out
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+class Tags(HTMLParser):
+    """Collects tags, ids and visible text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+    @property
+    def ids(self) -> list[str]:
+        return [str(attrs["id"]) for _, attrs in self.tags if "id" in attrs]
+
+
+def pages(site: Path) -> Iterator[tuple[Path, Tags]]:
+    for path in sorted(site.rglob("*.html")):
+        yield path, Tags(path.read_text(encoding="utf-8"))
+
+
+def test_two_builds_are_equal(small: tuple[Benchmark, Board], site: Path, tmp_path: Path) -> None:
+    other = tmp_path / "deep" / "er"
+    build_site(small[0], other, list(reversed(small[1])), jobs=1)
+    assert contents(other) == contents(site)
+
+
+def test_expected_pages(site: Path) -> None:
+    found = {path.relative_to(site).as_posix() for path, _ in pages(site)}
+    assert {"index.html", "videos.html", "method.html", "videos/v1.html", "videos/zz-gone.html"} <= found
+    assert {"submissions/good-system.html", "submissions/silent.html"} <= found
+
+
+def test_rebuild_decodes_and_writes_nothing(
+    small: tuple[Benchmark, Board], site: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build_module, "make_media", None)  # calling it would fail
+    before = contents(site)
+    report = build_site(small[0], site, small[1])
+    assert (report.written, report.removed, report.decoded) == (0, 0, 0)
+    assert report.unchanged == len(before) - 1  # all but the manifest
+    assert contents(site) == before
+
+
+def test_only_what_changed_is_made_again(small: tuple[Benchmark, Board], site: Path, tmp_path: Path) -> None:
+    out = tmp_path / "site"
+    shutil.copytree(site, out)
+    damaged = next((out / "media" / "v2").glob("t*.webp"))
+    damaged.write_bytes(b"damaged")
+    report = build_site(small[0], out, small[1])
+    assert (report.decoded, report.written) == (1, 1)
+    assert contents(out) == contents(site)
+    (out / MANIFEST).write_text("[not json", encoding="utf-8")
+    assert build_site(small[0], out, small[1]).decoded == 4
+    assert contents(out) == contents(site)
+
+
+def test_stale_files_go_and_foreign_files_stay(
+    small: tuple[Benchmark, Board], site: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "site"
+    shutil.copytree(site, out)
+    (out / ".gitignore").write_text("*\n", encoding="utf-8")
+    (out / "videos" / "mine.html").write_text("mine", encoding="utf-8")
+    outside = tmp_path / "outside.txt"
+    outside.write_text("keep", encoding="utf-8")
+    manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
+    manifest["files"]["../outside.txt"] = "0" * 64
+    (out / MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
+    board = [entry for entry in small[1] if entry[0].slug != "silent"]
+    report = build_site(small[0], out, board)
+    assert report.removed == 1
+    assert not (out / "submissions" / "silent.html").exists()
+    assert (out / ".gitignore").exists() and (out / "videos" / "mine.html").exists() and outside.exists()
+
+
+def test_no_submission_yet(small: tuple[Benchmark, Board], tmp_path: Path) -> None:
+    build_site(small[0], tmp_path, [])
+    assert "No submission yet" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert not (tmp_path / "assets" / "plotly.min.js").exists()
+
+
+def test_footer_holds_the_hash_of_the_tree(small: tuple[Benchmark, Board], site: Path) -> None:
+    import hashlib
+
+    blank = re.compile(rb'(id="tree-sha256">)[0-9a-f]{64}<')
+    lines = []
+    for path, data in contents(site).items():
+        if not Path(path).name.startswith("."):
+            page = blank.sub(rb"\1<", data) if path.endswith(".html") else data
+            lines.append(f"{hashlib.sha256(page).hexdigest()}  {path}\n")
+    tree = hashlib.sha256("".join(sorted(lines)).encode()).hexdigest()
+    for _, tags in pages(site):
+        assert tree in tags.text
+
+
+def test_every_link_and_asset_is_there(site: Path) -> None:
+    for path, tags in pages(site):
+        for tag, attrs in tags.tags:
+            for name in ("href", "src", "poster"):
+                address = attrs.get(name)
+                if address is None:
+                    continue
+                parts = urlsplit(address)
+                if parts.scheme:
+                    assert tag == "a" and parts.scheme in {"https", "http"}, (path, tag, address)
+                    continue
+                target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+                assert target.is_file() and target.is_relative_to(site), (path, address)
+                if parts.fragment:
+                    assert unquote(parts.fragment) in Tags(target.read_text(encoding="utf-8")).ids, (
+                        path,
+                        address,
+                    )
+
+
+def test_ids_are_unique_and_pages_complete(site: Path) -> None:
+    for path, tags in pages(site):
+        assert len(tags.ids) == len(set(tags.ids)), path
+        names = [attrs.get("name") for tag, attrs in tags.tags if tag == "meta"]
+        assert "description" in names and "viewport" in names
+        assert sum(tag == "h1" for tag, _ in tags.tags) == 1, path
+        assert all(attrs.get("alt") for tag, attrs in tags.tags if tag == "img"), path
+        assert not any(
+            name.startswith("on") or name == "style" for _, attrs in tags.tags for name in attrs
+        ), path
+        assert all("src" in attrs for tag, attrs in tags.tags if tag == "script"), path
+        assert tags.tags.count(("main", {"id": "main", "class": "wrap", "tabindex": "-1"})) == 1
+
+
+def test_nothing_but_plotly_names_other_hosts(site: Path) -> None:
+    """Styles and scripts of ours load nothing; plotly is kept in by the policy and the browser tests."""
+    for path in (site / "assets").glob("*"):
+        if path.name not in {"plotly.min.js", "icon.svg"}:
+            text = path.read_text(encoding="utf-8")
+            assert not re.search(r"https?:|//cdn|@import|url\(|fetch\(|XMLHttpRequest", text), path
+
+
+def test_hostile_text_stays_text(site: Path) -> None:
+    for path, tags in pages(site):
+        raw = path.read_text(encoding="utf-8")
+        assert BIDI not in raw and "\u2028" not in raw, path
+        assert "alert(1)</script>" not in raw, path
+        assert "49" not in re.findall(r"evil &amp;amp; .{0,40}", raw)
+        assert not any(attrs.get("src") == "x" for _, attrs in tags.tags), path
+    video = (site / "videos" / "v1.html").read_text(encoding="utf-8")
+    assert "⟨U+202E⟩" in video and "{{ 7*7 }}" in video and "&lt;/script&gt;" in video
+    assert LONG in (site / "videos" / "v2.html").read_text(encoding="utf-8")
+    script = (site / "data" / "leaderboard.js").read_text(encoding="utf-8")
+    assert "<" not in script and script.isascii()
+
+
+def test_downloads(site: Path) -> None:
+    with (site / "data" / "leaderboard.csv").open(encoding="utf-8", newline="") as source:
+        rows = list(csv.DictReader(source))
+    assert [row["rank"] for row in rows] == ["1", "2", "2"]  # a tie shares its rank
+    assert {row["submission"] for row in rows} == {"Good system", "'" + FORMULA, "Silent"}
+    board = json.loads((site / "data" / "leaderboard.json").read_text(encoding="utf-8"))
+    assert board["threshold"] == 0.8 and {row["submission"] for row in board["rows"]} >= {FORMULA}
+    assert all(row["signature"].startswith("coooler:") for row in board["rows"])
+
+
+def test_pages_read_without_scripts(site: Path) -> None:
+    video = Tags((site / "videos" / "v2.html").read_text(encoding="utf-8"))
+    for words in ("A deer stands on the road", "A tyre lies in our lane", "1.0000", "Detected", "above 0.80"):
+        assert words in video.text
+    assert "The run failed on this video: broken" in video.text
+    first = Tags((site / "videos" / "v1.html").read_text(encoding="utf-8"))
+    assert "Scene descriptions" in first.text and "1 too narrow, 1 too low" in first.text
+    assert sum(tag == "rect" and "x" in attrs for tag, attrs in first.tags) == (25 + 1) * 2
+    assert "No hazard." in Tags((site / "videos" / "v3.html").read_text(encoding="utf-8")).text
+    gone = Tags((site / "videos" / "zz-gone.html").read_text(encoding="utf-8"))
+    assert "There is no clip of this video" in gone.text
+    assert "0.3922" in Tags((site / "index.html").read_text(encoding="utf-8")).text
+
+
+def test_a_broken_clip_is_said_and_the_rest_is_built(tmp_path: Path) -> None:
+    benchmark = make_benchmark(tmp_path / "b", clips=1)
+    (benchmark.videos / "zz-gone.mp4").write_bytes(b"not a video")
+    build_site(benchmark, tmp_path / "site", [])
+    page = Tags((tmp_path / "site" / "videos" / "zz-gone.html").read_text(encoding="utf-8")).text
+    assert "No pictures: zz-gone.mp4:" in page and str(tmp_path) not in page
+
+
+def test_clips_can_be_left_out(tmp_path: Path) -> None:
+    benchmark = make_benchmark(tmp_path / "b", clips=1)
+    shown = benchmark.settings.model_copy(update={"show_videos": False})
+    build_site(Benchmark(benchmark.root, shown), tmp_path / "site", [])
+    assert not list((tmp_path / "site").rglob("*.mp4"))
+    assert "<video" not in (tmp_path / "site" / "videos" / "v1.html").read_text(encoding="utf-8")
+
+
+def test_media_record_round_trip(site: Path) -> None:
+    manifest = json.loads((site / MANIFEST).read_text(encoding="utf-8"))
+    media = media_from_json(manifest["media"]["v1"]["media"])
+    assert media_to_json(media) == manifest["media"]["v1"]["media"] and len(media.frames) == 25
+    assert {crop.kind for crop in media.crops} == {Kind.CHALLENGE, Kind.TRAFFIC}
+    assert [crop.frame_index for crop in media.crops if crop.kind is Kind.CHALLENGE] == [26, 28, 29]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("plain", "plain"),
+        ("a\u202eb", "a⟨U+202E⟩b"),
+        ("a\x00b\x1b", "a⟨U+0000⟩b⟨U+001B⟩"),
+        ("two\nlines\t", "two lines "),
+        ("\u2066x\u2069\ufeff", "⟨U+2066⟩x⟨U+2069⟩⟨U+FEFF⟩"),
+        ("\ud800", "⟨U+D800⟩"),
+        ("👩\u200d🚒", "👩\u200d🚒"),
+        ("Ünïcödé 猫", "Ünïcödé 猫"),
+    ],
+)
+def test_visible(text: str, shown: str) -> None:
+    assert visible(text) == shown
+
+
+def test_difference() -> None:
+    assert difference("A cat crossing the road", "a cat is crossing the street.") == (
+        ("same", "a cat"),
+        ("added", "is"),
+        ("same", "crossing the"),
+        ("missing", "road"),
+        ("added", "street"),
+    )
+    assert difference("A cat", "a cat!") == (("same", "a cat"),)
+    assert difference("", "new") == (("added", "new"),)
+    assert difference("x " * 500, "y")[0][0] == "added"
+
+
+def test_shorten_and_counts() -> None:
+    assert shorten("abcdef", 4) == "abc…" and shorten("abc", 3) == "abc"
+    assert counts([0.0, 0.05, 1.0, 0.999]) == [1, 1, *[0] * 17, 2]
+
+
+def test_scripts_and_labels_are_escaped() -> None:
+    assert json.loads(script_json({"a": EVIL})) == {"a": EVIL}
+    assert not set("<>&\u2028") & set(script_json(EVIL))
+    assert label('<a href="x">b</a>') == "&lt;a href=&quot;x&quot;&gt;b&lt;/a&gt;"
+
+
+def test_path_names_are_safe_and_unique() -> None:
+    names = path_names(["a", "A", "../x", "b/c", "..", "", "ok_1.2"])
+    assert names["ok_1.2"] == "ok_1.2"
+    assert len({name.casefold() for name in names.values()}) == 7
+    assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name) for name in names.values())
+
+
+def test_blocks() -> None:
+    found = blocks("# T\n\none\ntwo `x`\n\n- a\n  b\n- [c](d)\n\n```\n<k>\n```\n\n|h|\n|--|\n|1|")
+    assert [block.kind for block in found] == ["heading", "paragraph", "list", "code", "table"]
+    assert found[1].lines == ("one two x",) and found[2].lines == ("a b", "c (d)")
+    assert found[3].lines == ("<k>",) and found[4].rows == (("h",), ("1",))
+
+
+@pytest.mark.parametrize("path", ["../x", "/x", "a/../b", "a\\b", "a//b", "./a", ""])
+def test_output_refuses_paths_that_lead_out(tmp_path: Path, path: str) -> None:
+    with pytest.raises(ValueError, match="not a path inside"):
+        open_output(tmp_path).add(path, b"")
+
+
+def test_output_refuses_one_path_twice(tmp_path: Path) -> None:
+    output = open_output(tmp_path)
+    output.add("a.txt", b"1")
+    with pytest.raises(ValueError, match="twice"):
+        output.add("a.txt", b"1")
+
+
+def test_tree_hash_by_hand() -> None:
+    import hashlib
+
+    text = f"{'a' * 64}  z\n{'b' * 64}  a\n"
+    assert tree_sha256({"a": "b" * 64, "z": "a" * 64}) == hashlib.sha256(text.encode()).hexdigest()
+    with pytest.raises(ValueError, match="found 0"):
+        stamped(b"no place", "0")
+
+
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("bytes=0-", (0, 10)),
+        ("bytes=2-4", (2, 5)),
+        ("bytes=8-99", (8, 10)),
+        ("bytes=-3", (7, 10)),
+        ("bytes=-0", None),
+        ("bytes=10-", None),
+        ("bytes=5-2", None),
+        ("lines=1-2", None),
+        ("bytes=0-1,3-4", None),
+    ],
+)
+def test_byte_range(header: str, expected: tuple[int, int] | None) -> None:
+    assert byte_range(header, 10) == expected
+
+
+def test_served_files_stay_inside(tmp_path: Path) -> None:
+    site = (tmp_path / "site").resolve()
+    (site / "sub").mkdir(parents=True)
+    (site / "index.html").write_text("x")
+    (site / ".hidden").write_text("x")
+    (tmp_path / "secret.txt").write_text("x")
+    (site / "link.txt").symlink_to(tmp_path / "secret.txt")
+    assert find_file(site, "/") == site / "index.html" == find_file(site, "/index.html?x=1#y")
+    for target in (
+        "/../secret.txt",
+        "/%2e%2e/secret.txt",
+        "/.hidden",
+        "/link.txt",
+        "/sub",
+        "/%00",
+        "/..%5csecret.txt",
+    ):
+        assert find_file(site, target) is None
