@@ -126,7 +126,7 @@ def lite0_graph(tensors: Tensors, where: str) -> bytes:
 
 def to_input(crop: RgbImage) -> RgbImage:
     """A crop of any size from 1 x 1 as (224, 224, 3); its aspect is not kept, all of it is seen."""
-    import cv2  # noqa: PLC0415 - a run without pictures does not load it
+    import cv2
 
     if crop.ndim != 3 or crop.shape[2] != 3 or crop.dtype != np.uint8 or crop.size == 0:
         raise InputError(f"crop: found {crop.dtype}{crop.shape}; expected uint8 (H, W, 3) of 1 x 1 or more.")

@@ -86,9 +86,9 @@ class EmbeddedVisionAgent:
         sentences = [light] if (light := light_condition(frame.rgb)) else []
         for track_box, noun in sorted(self._named(frame), key=lambda pair: -pair[0].box.area_px2):
             motion = self._motion(track_box)
-            place = _place(track_box, frame.rgb.shape[1])
+            place = "" if "crossing" in motion else f" {_place(track_box, frame.rgb.shape[1])}"
             article = "An" if noun[0] in "aeiou" else "A"
-            sentences.append(f"{article} {noun} {motion} {place}.")
+            sentences.append(f"{article} {noun} {motion}{place}.")
         return sentences
 
     def _list(self, frames: Sequence[Frame], call: int) -> list[str]:

@@ -27,7 +27,7 @@ def cache_folder() -> Path:
     chosen = os.environ.get("COOOLER_CACHE")
     if chosen:
         return Path(chosen)
-    from platformdirs import user_cache_path  # noqa: PLC0415 - only when it is needed
+    from platformdirs import user_cache_path
 
     return user_cache_path("coooler", appauthor=False)
 
@@ -43,7 +43,7 @@ class Graph:
 
     def constant(self, value: NDArray[Any] | Sequence[int] | float, dtype: str = "") -> str:
         """A constant's name; equal constants are stored once. Plain ints are int64, floats float32."""
-        from onnx import numpy_helper  # noqa: PLC0415
+        from onnx import numpy_helper
 
         array = np.asarray(value)
         if not dtype:
@@ -57,7 +57,7 @@ class Graph:
 
     def add(self, kind: str, *inputs: str, name: str = "", domain: str = "", **attributes: Any) -> str:
         """Add a node with one output and return the output's name."""
-        from onnx import helper  # noqa: PLC0415
+        from onnx import helper
 
         output = name or f"v{len(self._nodes)}"
         self._nodes.append(helper.make_node(kind, list(inputs), [output], domain=domain, **attributes))
@@ -69,7 +69,7 @@ class Graph:
         outputs: Mapping[str, tuple[str, Sequence[int | str]]],
     ) -> bytes:
         """The checked model as bytes, the same for the same calls; values are (dtype, shape)."""
-        import onnx  # noqa: PLC0415
+        import onnx
 
         def values(described: Mapping[str, tuple[str, Sequence[int | str]]]) -> list[Any]:
             types = {
@@ -120,7 +120,7 @@ def built(name: str, key: str, build: Callable[[], bytes]) -> Path:
 
 def require_self_contained(model: bytes, what: str) -> None:
     """Raise InputError when a model is no ONNX or keeps tensors in other files, which its hash misses."""
-    import onnx  # noqa: PLC0415
+    import onnx
 
     def tensors(nodes: Any) -> Iterator[Any]:
         for attribute in (attribute for node in nodes for attribute in node.attribute):
@@ -174,7 +174,7 @@ def open_session(model: Path | bytes, threads: int | None = None) -> Any:
 
     Raises OutsideError when onnxruntime refuses the model.
     """
-    import onnxruntime  # noqa: PLC0415
+    import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 3

@@ -188,7 +188,7 @@ class OnnxEmbedder:
         return read_model_file(self._root, "tokenizer.json", MAX_TOKENIZER_BYTES)
 
     def _open(self) -> None:
-        import tokenizers  # noqa: PLC0415 - heavy, and not needed when every vector is cached
+        import tokenizers
 
         try:
             tokenizer = tokenizers.Tokenizer.from_str(self._read_tokenizer().decode())

@@ -24,7 +24,8 @@ from pipeline.interfaces import Embedder, Executor
 from pipeline.minilm import open_embedder
 from pipeline.records import Stage, StageOutput, TrackBox, VideoOutcome
 from pipeline.stages import Agents, run_stages
-from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES, Table, metadata
+from pipeline.table import Table, metadata
+from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES
 from pipeline.verify import verify
 from pipeline.video import read_keyframes
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from pipeline.benchmark import Benchmark
 from pipeline.minilm import open_embedder
 from pipeline.records import Evaluation
-from pipeline.tables import MATCHES, OUTCOMES, SNIPPETS, STAGES, metadata
+from pipeline.table import metadata
+from pipeline.tables import MATCHES, OUTCOMES, SNIPPETS, STAGES
 from sitegen.build import BuildReport, build_site
 from sitegen.evaluate import embed_all, evaluate, texts_of, truth_sha256
 from sitegen.readers import read_predictions, read_truth

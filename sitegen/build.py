@@ -138,7 +138,7 @@ def _assets(with_charts: bool) -> Iterator[tuple[str, bytes]]:
         if path.is_file() and not path.name.startswith("."):
             yield f"assets/{path.relative_to(folder).as_posix()}", path.read_bytes()
     if with_charts:
-        from plotly.offline import get_plotlyjs  # noqa: PLC0415 - heavy
+        from plotly.offline import get_plotlyjs
 
         yield PLOTLY, get_plotlyjs().encode()
 

@@ -8,6 +8,7 @@ wrong in all three.
 import json
 import math
 import re
+import reprlib
 import unicodedata
 from dataclasses import dataclass, field
 from typing import NoReturn
@@ -29,7 +30,7 @@ _UNSEEN = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 SHORTEN = f"Shorten it to at most {MAX_TEXT_CHARS:,} characters."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Wrong(Exception):  # noqa: N818  (a control signal inside the readers, never seen by users)
     """A cell that cannot be accepted."""
 
@@ -97,7 +98,7 @@ def show(value: object) -> str:
         return "nothing (null)"
     if isinstance(value, float) and math.isnan(value):
         return "NaN"
-    return f"{visible(repr(value))} ({type(value).__name__})"
+    return f"{visible(reprlib.repr(value))} ({type(value).__name__})"
 
 
 def is_missing(value: object) -> bool:
@@ -121,7 +122,7 @@ def text(value: object, expected: str = "text") -> str:
             found = f"{broken[:8]!r}, which is not UTF-8, in {show(value)}"
             raise Wrong(found, "text in UTF-8", "Save the file as UTF-8.") from None
     stripped = value.strip()
-    if not stripped:
+    if not any(char.isprintable() and not char.isspace() for char in stripped):
         raise Wrong(show(value), expected, "Fill it in, or leave the row out.")
     if len(stripped) > MAX_TEXT_CHARS:
         raise Wrong(show(value), f"at most {MAX_TEXT_CHARS:,} characters", SHORTEN)

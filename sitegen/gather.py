@@ -7,7 +7,8 @@ from pipeline.benchmark import Benchmark
 from pipeline.errors import ConfigError
 from pipeline.files import sha256_file
 from pipeline.records import Evaluation, Match, Snippet, StageOutput, TrackBox, TruthHazard, VideoOutcome
-from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES, Table
+from pipeline.table import Table
+from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES
 from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names
 from sitegen.leaderboard import rank
 from sitegen.media import MediaJob, MediaSettings

@@ -1,4 +1,8 @@
-"""Clips to the pictures that pages show: keyframes in two sizes, a card, box crops; all WebP.
+"""Clips to the pictures that pages show: keyframes in two sizes, a card, box crops.
+
+What loads with a page is WebP, for its weight. The large keyframes load when asked for and are
+JPEG: at the same quality a third more bytes, but encoded in a thirtieth of the time. The one large
+keyframe that a page opens with is WebP.
 
 Boxes are not burnt in: pages draw them over the pictures, so that a reader can turn them off.
 """
@@ -21,13 +25,14 @@ from sitegen.gathered import CropPicture, KeyframePicture, VideoMedia
 
 @dataclass(frozen=True, slots=True)
 class MediaSettings:
-    """Sizes are widths in pixels, qualities WebP's 1 to 100; pictures are never enlarged."""
+    """Sizes are widths in pixels, qualities 1 to 100; pictures are never enlarged."""
 
     keyframes: int = 25
     thumb_px: int = 240
     thumb_quality: int = 58
-    full_px: int = 960
-    full_quality: int = 72
+    full_px: int = 800
+    full_quality: int = 74
+    cover_quality: int = 72
     card_px: int = 400
     card_quality: int = 62
     crop_px: int = 192
@@ -101,13 +106,16 @@ def make_media(job: MediaJob) -> MadeMedia:
     frames: list[KeyframePicture] = []
     cover = _cover(found.frames, job.boxes)
     for place, frame in enumerate(found.frames):
-        thumb, full = f"{folder}/t{frame.index:06d}.webp", f"{folder}/f{frame.index:06d}.webp"
-        files.append((thumb, _webp(_fit(frame.rgb, settings.thumb_px), settings.thumb_quality)))
-        files.append((full, _webp(_fit(frame.rgb, settings.full_px), settings.full_quality)))
-        frames.append(KeyframePicture(frame.index, round(frame.time_s, 3), thumb, full))
+        large = _fit(frame.rgb, settings.full_px)
+        thumb, full = f"{folder}/t{frame.index:06d}.webp", f"{folder}/f{frame.index:06d}.jpg"
+        files.append((thumb, _webp(_fit(large, settings.thumb_px), settings.thumb_quality)))
         if place == cover:
-            card = _webp(_fit(frame.rgb, settings.card_px), settings.card_quality)
-            files.append((f"{folder}/card.webp", card))
+            full = f"{folder}/cover.webp"
+            files.append((full, _webp(large, settings.cover_quality)))
+            files.append((f"{folder}/card.webp", _webp(_fit(large, settings.card_px), settings.card_quality)))
+        else:
+            files.append((full, _jpeg(large, settings.full_quality)))
+        frames.append(KeyframePicture(frame.index, round(frame.time_s, 3), thumb, full))
     crops: list[CropPicture] = []
     pictures = {frame.index: frame.rgb for frame in found.frames}
     for number, chosen in enumerate(choose_crops(job.boxes, pictures, settings)):
@@ -208,7 +216,7 @@ def _cut(picture: RgbImage, box: Box) -> RgbImage:
 
 def _fit(picture: RgbImage, limit_px: int, side_px: int | None = None) -> RgbImage:
     """The picture scaled so that `side_px` (its width by default) becomes at most `limit_px`."""
-    import cv2  # noqa: PLC0415 - heavy
+    import cv2
 
     scale = min(1.0, limit_px / (side_px or picture.shape[1]))
     if scale == 1.0:
@@ -218,10 +226,21 @@ def _fit(picture: RgbImage, limit_px: int, side_px: int | None = None) -> RgbIma
 
 
 def _webp(picture: RgbImage, quality: int) -> bytes:
-    import cv2  # noqa: PLC0415 - heavy
+    import cv2
 
-    bgr = np.ascontiguousarray(picture[:, :, ::-1])
-    done, data = cv2.imencode(".webp", bgr, [cv2.IMWRITE_WEBP_QUALITY, quality])
+    return _encoded(picture, ".webp", [cv2.IMWRITE_WEBP_QUALITY, quality])
+
+
+def _jpeg(picture: RgbImage, quality: int) -> bytes:
+    import cv2
+
+    return _encoded(picture, ".jpg", [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1])
+
+
+def _encoded(picture: RgbImage, ending: str, options: list[int]) -> bytes:
+    import cv2
+
+    done, data = cv2.imencode(ending, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)
     if not done:
         raise VideoError(f"A picture of {picture.shape[1]}x{picture.shape[0]} px could not be encoded.")
     return bytes(data.tobytes())

@@ -41,8 +41,11 @@ class Output:
 
     def add_all(self, files: Iterable[tuple[str, bytes]]) -> None:
         """`add` for many files."""
+        claimed = [self._claim(path, data) for path, data in files]
         with ThreadPoolExecutor(_WRITERS) as pool:
-            list(pool.map(self._write, [self._claim(path, data) for path, data in files]))
+            written = sum(pool.map(self._write, claimed))
+        self.written += written
+        self.unchanged += len(claimed) - written
 
     def kept(self, paths: Mapping[str, str]) -> bool:
         """Keep files of an earlier build, path -> hash, when all are as they were; else keep none."""
@@ -87,14 +90,14 @@ class Output:
         if _checked(path) in self.files:
             raise ValueError(f"{path}: written twice in one build")
 
-    def _write(self, file: tuple[str, bytes]) -> None:
+    def _write(self, file: tuple[str, bytes]) -> bool:
+        """Write a file unless it is there already; say whether it was written."""
         path, data = file
         target = self.folder / path
         if target.is_file() and target.stat().st_size == len(data) and target.read_bytes() == data:
-            self.unchanged += 1
-            return
+            return False
         write_bytes(target, data)
-        self.written += 1
+        return True
 
 
 def open_output(folder: Path) -> Output:

@@ -121,8 +121,9 @@ def _charts(data: SiteData) -> tuple[Chart, ...]:
     spread = Chart(
         "distribution",
         "How close the best caption comes",
-        f"{visible(head.name)} passes the threshold of {data.settings.threshold:.2f} in {passed} of "
-        f"{plural(len(head.evaluation.videos), 'video')}. Each bar counts videos by their best similarity.",
+        f"{visible(head.name)} detects {passed} of {plural(len(head.evaluation.videos), 'video')}: above "
+        f"{data.settings.threshold:.2f}, or rightly silent, which counts as 1. Each bar counts videos by "
+        "their best similarity.",
         ("Submission", *(f"{i / BINS:.1f}–{(i + 1) / BINS:.1f}" for i in range(BINS))),
         tuple((visible(s.name), *map(str, _coarse(s))) for s in systems),
     )

@@ -32,12 +32,13 @@ MODELS = (
 )
 
 # One line a file, "hash  path", sorted, hashed; a page counts with its own footer's hash left out.
-VERIFY = """find . -type f ! -name '.*' | sed 's|^\\./||' | while read -r f; do
+VERIFY = """blank='s|id="tree-sha256">[0-9a-f]*<|id="tree-sha256"><|'
+find . -type f ! -name '.*' | sed 's|^./||' | while read -r f; do
   case "$f" in
-    *.html) h=$(sed 's|id="tree-sha256">[0-9a-f]*<|id="tree-sha256"><|' "$f" | sha256sum) ;;
-    *) h=$(sha256sum < "$f") ;;
+    *.html) hash=$(sed "$blank" "$f" | sha256sum) ;;
+    *) hash=$(sha256sum < "$f") ;;
   esac
-  printf '%s  %s\\n' "${h%% *}" "$f"
+  echo "${hash%% *}  $f"
 done | LC_ALL=C sort | sha256sum"""
 
 SIGNATURE_PARTS = (

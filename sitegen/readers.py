@@ -25,6 +25,7 @@ _TRUTH_REQUIRED = TRUTH_COLUMNS[:4]
 _SHOWN_IDS = 20
 _SUGGESTIONS = 20
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+_UNSEEN: Any = object()
 _BAD: Any = object()  # a cell whose fault is already noted
 
 
@@ -118,23 +119,24 @@ def _column(
     """The clean values of a column, `_BAD` where a fault was noted.
 
     A cell that holds nothing becomes `missing`; left at `_BAD`, the column is required and `check`
-    words the fault. Equal texts are checked once: many captions and ids are repeated.
+    words the fault. Equal texts and numbers are checked once: ids, ranks and captions repeat.
     """
     cells = sheet.cells.get(name)
     if cells is None:
         return [_BAD if name in faults.kept else missing] * len(sheet.rows)
-    seen: dict[str, Any] = {}
+    seen: dict[type, dict[Any, Any]] = {str: {}, int: {}}
     clean: list[Any] = []
     for row, value in zip(sheet.rows, cells, strict=True):
-        result = seen.get(value) if isinstance(value, str) else None
-        if result is None:
+        results = seen.get(type(value))
+        result = _UNSEEN if results is None else results.get(value, _UNSEEN)
+        if result is _UNSEEN:
             try:
                 result = missing if missing is not _BAD and is_missing(value) else check(value)
             except Wrong as wrong:
-                result = wrong
-            if isinstance(value, str):
-                seen[value] = result
-        if isinstance(result, Wrong):
+                result = wrong.with_traceback(None)
+            if results is not None:
+                results[value] = result
+        if type(result) is Wrong:
             faults.add(row, name, result.found, result.expected, result.mend)
             result = _BAD
         clean.append(result)
@@ -142,6 +144,8 @@ def _column(
 
 
 def _missing_columns(sheet: Sheet, required: Sequence[str], faults: Faults) -> None:
+    if not sheet.columns and faults.kept:  # no line could be read, so nothing is known of columns
+        return
     spelled = {name.strip().lower().replace(" ", "_").replace("-", "_"): name for name in sheet.columns}
     for name in required:
         if name not in sheet.columns:

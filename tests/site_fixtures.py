@@ -72,7 +72,8 @@ def make_benchmark(root: Path, clips: int = 3) -> Benchmark:
         encoding="utf-8",
     )
     (root / "CREDIT.md").write_text(
-        "# Credit\n\nThe clips were `drawn` by **the tests**.\n\n- one <i>item</i>\n\n| a | b |\n|---|---|\n| 1 | 2 |\n",
+        "# Credit\n\nThe clips were `drawn` by **the tests**.\n\n- one <i>item</i>\n\n"
+        "| a | b |\n|---|---|\n| 1 | 2 |\n",
         encoding="utf-8",
     )
     boxes: list[TrackBox] = []
@@ -116,12 +117,14 @@ def make_board(benchmark: Benchmark) -> Board:
     ]
     evil = [Prediction("v1", 1, EVIL, EVIL), Prediction("v2", 1, LONG), Prediction("v2", 2, FORMULA)]
     good_folder = root / "submissions" / "good-system"
-    good_folder.mkdir(parents=True, exist_ok=True)
-    _write_records(good_folder)
+    evil_folder = root / "submissions" / "evil"
+    for folder in (good_folder, evil_folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        _write_records(folder)
     truth = read_truth(benchmark.truth)
     return [
         _entry(benchmark, truth, "Good system", good, "An embedded baseline", good_folder),
-        _entry(benchmark, truth, FORMULA, evil, EVIL, root / "submissions" / "evil"),
+        _entry(benchmark, truth, FORMULA, evil, EVIL, evil_folder),
         _entry(benchmark, truth, "Silent", [], "", root / "submissions" / "silent"),
     ]
 

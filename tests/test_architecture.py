@@ -11,17 +11,29 @@ ROOT = Path(__file__).parent.parent
 
 # Lower floors know nothing of higher ones; modules of one floor do not import each other.
 FLOORS = [
-    ["pipeline.__init__", "pipeline.errors", "sitegen.__init__"],
-    ["pipeline.files", "pipeline.records", "pipeline.console"],
-    ["pipeline.tables", "pipeline.interfaces", "pipeline.config"],
-    ["pipeline.prompts", "pipeline.benchmark", "pipeline.graphs", "pipeline.weights"],
-    ["pipeline.video", "pipeline.parsing", "pipeline.chunks", "pipeline.execute", "pipeline.vector_cache"],
-    ["pipeline.minilm"],
-    ["pipeline.classifier"],
-    ["pipeline.models", "pipeline.embedded_vision", "pipeline.embedded_language"],
-    ["pipeline.stages", "pipeline.verify"],
+    ["pipeline.__init__", "pipeline.errors", "pipeline.files", "pipeline.console"],
+    ["pipeline.records"],
+    ["pipeline.table", "pipeline.interfaces", "pipeline.config"],
+    ["pipeline.tables", "pipeline.prompts", "pipeline.benchmark", "pipeline.video", "pipeline.parsing"],
+    ["pipeline.chunks", "pipeline.execute", "pipeline.weights", "pipeline.graphs", "pipeline.vector_cache"],
+    ["pipeline.bert", "pipeline.classifier"],
+    ["pipeline.minilm", "pipeline.embedded_vision", "pipeline.embedded_language"],
+    ["pipeline.models", "pipeline.stages", "pipeline.verify"],
     ["pipeline.run"],
     ["pipeline.cli"],
+    ["sitegen.__init__", "sitegen.words", "sitegen.numerals", "sitegen.blocks"],
+    ["sitegen.checks", "sitegen.score", "sitegen.ledger", "sitegen.output", "sitegen.contexts"],
+    ["sitegen.about", "sitegen.evaluate", "sitegen.gathered", "sitegen.formats"],
+    ["sitegen.sheets", "sitegen.media", "sitegen.transcript", "sitegen.verdicts", "sitegen.leaderboard"],
+    ["sitegen.readers", "sitegen.charts", "sitegen.serve"],
+    ["sitegen.submissions"],
+    ["sitegen.page_board", "sitegen.page_video", "sitegen.page_submission", "sitegen.page_method"],
+    ["sitegen.pages"],
+    ["sitegen.gather"],
+    ["sitegen.build"],
+    ["sitegen.board"],
+    ["sitegen.demo"],
+    ["sitegen.cli"],
 ]
 
 
@@ -60,7 +72,7 @@ def test_imports_go_down(name: str, path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "path"), _modules(), ids=[name for name, _ in _modules()])
 def test_files_stay_short(name: str, path: Path) -> None:
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= 345
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 320
 
 
 def test_help_loads_nothing_heavy() -> None:

@@ -1,4 +1,4 @@
-"""The site in a real Chromium: by double-click and served, both widths, both themes, with and without scripts."""
+"""The site in a real Chromium: by double-click and served, both widths and themes, scripts on and off."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -38,9 +38,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def browser() -> Iterator[Browser]:
     executable = find_chromium()
     assert executable, "No Chromium; run: python -m tests.browser_setup"
-    with sync_playwright() as playwright:
-        with playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started:
-            yield started
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started,
+    ):
+        yield started
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +149,7 @@ def test_frames_by_key_and_click(context: BrowserContext, site: Path) -> None:
     page.keyboard.press("ArrowRight")
     current = page.locator("#strip a[aria-current]")
     assert current.get_attribute("href") == links.nth(4).get_attribute("href")
-    page.wait_for_function("document.getElementById('stage-picture').src.endsWith('f000005.webp')")
+    page.wait_for_function("document.getElementById('stage-picture').src.endsWith('f000005.jpg')")
     assert page.locator("#stage-text").inner_text().startswith("Frame 5 ")
     assert page.locator("#stage svg rect").count() == 2
     page.locator("#frame-back").click()
@@ -236,4 +238,4 @@ def test_pages_read_without_scripts(browser: Browser, site: Path) -> None:
         page.goto(f"{site.as_uri()}/videos/v1.html")
         assert page.locator("#strip img").count() == 25
         page.locator("#strip a").first.click()  # leads to the large picture
-        assert page.url.endswith("/media/v1/f000000.webp")
+        assert page.url.endswith("/media/v1/f000000.jpg")

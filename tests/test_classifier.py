@@ -117,7 +117,8 @@ def test_the_class_table() -> None:
         665: ("moped", "motorcycle"), 670: ("motor scooter", "motorcycle"), 671: ("mountain bike", "bicycle"),
         829: ("streetcar", "train"), 919: ("street sign", "sign"), 920: ("traffic light", "sign"),
         489: ("chainlink fence", "barrier"), 912: ("worm fence", "barrier"), 478: ("carton", "debris"),
-        999: ("toilet tissue", "debris"), 519: ("crate", "debris"), 427: ("barrel", "debris"), 834: ("suit", "person"),
+        999: ("toilet tissue", "debris"), 519: ("crate", "debris"), 427: ("barrel", "debris"),
+        834: ("suit", "person"),
     }  # fmt: skip
     assert {index: tuple(classes[index]) for index in expected} == expected
 

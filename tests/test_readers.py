@@ -161,7 +161,9 @@ def test_header_only_is_a_submission_that_predicts_nothing(tmp_path: Path) -> No
 
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=30)
-CAPTION = TEXT.map(str.strip).filter(lambda text: text and text.lower() != "nan")
+CAPTION = TEXT.map(str.strip).filter(
+    lambda text: any(char.isprintable() and not char.isspace() for char in text) and text.lower() != "nan"
+)
 IDS = st.from_regex(checks.SAFE_ID, fullmatch=True)
 RECORDS = st.lists(
     st.builds(

@@ -11,7 +11,8 @@ from pipeline.errors import FaultsError, InputError
 from pipeline.execute import ProcessExecutor, SerialExecutor
 from pipeline.records import Box, Kind, Stage, TrackBox
 from pipeline.run import RUN_TABLES, RunReport, VideoRun, find_videos, predict
-from pipeline.tables import BOXES, OUTCOMES, PREDICTIONS, STAGES, metadata
+from pipeline.table import metadata
+from pipeline.tables import BOXES, OUTCOMES, PREDICTIONS, STAGES
 from tests.clips import write_clip
 
 DEMO = Path(__file__).parent.parent / "demo"

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -215,3 +216,18 @@ def test_a_failure_leaves_what_was_there(bench: Bench, monkeypatch: pytest.Monke
         bench.submit("New")
     assert [len(stored.submission.predictions) for stored in load_all(bench.folder)] == [2]
     assert sorted(os.listdir(bench.folder)) == ["ledger.jsonl", "team-a"]  # noqa: PTH208
+
+
+def test_submissions_at_the_same_time_all_reach_the_ledger(bench: Bench) -> None:
+    names = [f"Team {number}" for number in range(8)]
+    benches = []
+    for name in names:
+        root = bench.root / name
+        root.mkdir()
+        other = Bench(root)
+        other.folder = bench.folder
+        benches.append(other)
+    with ThreadPoolExecutor(len(names)) as pool:
+        list(pool.map(Bench.submit, benches, names))
+    assert sorted(slug for _, slug in bench.events()) == [f"team-{number}" for number in range(8)]
+    assert len(load_all(bench.folder)) == 8

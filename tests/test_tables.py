@@ -29,7 +29,8 @@ from pipeline.records import (
     VideoOutcome,
     VideoScore,
 )
-from pipeline.tables import PREDICTIONS, SCHEMA_VERSION, TABLES, Table, metadata
+from pipeline.table import SCHEMA_VERSION, Table, metadata
+from pipeline.tables import PREDICTIONS, TABLES
 
 _BOXES = [
     TrackBox("v2", 0, "1", Kind.TRAFFIC, Box(-3.5, 0, 10, 20.25)),

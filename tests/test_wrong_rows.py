@@ -26,6 +26,7 @@ WRONG_CSV: list[tuple[str, list[tuple[int | None, str | None, str]]]] = [
     ("v1,١,x\n", [(1, "rank", "'١'")]),
     ("v1,1,\n", [(1, "description", "an empty cell")]),
     ("v1,1,   \n", [(1, "description", "only blanks")]),
+    ("v1,1,\u200b \u2060\n", [(1, "description", "'\\u200b \\u2060'")]),
     ("v1,1,nan\n", [(1, "description", "'nan'")]),
     ("v1,1,NaN\n", [(1, "description", "'NaN'")]),
     ("v1,1," + "x" * 2001 + "\n", [(1, "description", f"2,001 characters: '{'x' * 80}...'")]),
@@ -98,6 +99,22 @@ WRONG_JSONL: list[tuple[str, list[tuple[int | None, str | None, str]]]] = [
 def test_wrong_values_in_json_lines(tmp_path: Path, line: str, expected: list[Any]) -> None:
     path = write(tmp_path, "p.jsonl", line + "\n")
     assert faults(lambda: read_predictions(path, HAZARDS)) == expected
+
+
+def test_deeply_nested_json(tmp_path: Path) -> None:
+    for depth in range(900, 1000, 3):
+        line = '{"video_id": "v1", "rank": 1, "description": ' + "[" * depth + "]" * depth + "}"
+        path = write(tmp_path, "p.jsonl", line)
+        assert [row for row, _ in places(lambda path=path: read_predictions(path))] == [1]  # type: ignore[misc]
+
+
+def test_an_object_without_keys(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.jsonl", "{}\n")
+    assert places(lambda: read_predictions(path)) == [
+        (None, "video_id"),
+        (None, "rank"),
+        (None, "description"),
+    ]
 
 
 def test_bad_json_lines_come_with_their_numbers(tmp_path: Path) -> None:
