@@ -27,7 +27,6 @@ SAME_LABEL = 0.70  # cosine from which two labels name one thing
 MIN_LIST_SHARE = 0.25  # of the lists of Track 2 that must name an element
 CONFLICT_BONUS = 0.5
 SHARE_BONUS = 0.2
-MIN_MENTIONS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +123,7 @@ class EmbeddedLanguageAgent:
         }
 
     def _grouped(self, mentions: Sequence[_Mention]) -> list[tuple[str, list[_Mention]]]:
-        """Mentions whose labels name one thing, under the most frequent label; rare ones dropped."""
+        """Mentions whose labels name one thing, under the most frequent of their labels."""
         counts = Counter(mention.label for mention in mentions)
         order = sorted(counts, key=lambda label: (-counts[label], label))
         if not order:
@@ -139,7 +138,7 @@ class EmbeddedLanguageAgent:
         groups: dict[str, list[_Mention]] = {}
         for mention in mentions:
             groups.setdefault(head[mention.label], []).append(mention)
-        return [(label, groups[label]) for label in order if len(groups.get(label, [])) >= MIN_MENTIONS]
+        return [(label, groups[label]) for label in order if label in groups]
 
     def _vectors(self, texts: Sequence[str]) -> NDArray[np.float32]:
         return self._embedder.embed(texts)

@@ -13,24 +13,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.classifier import CropClassifier
+from pipeline.classifier import CropClassifier, context_crop
 from pipeline.interfaces import Prompt
 from pipeline.records import Frame, Reply, RgbImage, TrackBox
-from pipeline.video import crop
 
-# Crops grown by half their size classify better than bare ones: the classifier was trained on
-# objects in a scene (measured on the demo's boxes).
-CROP_CONTEXT = 0.5
-MIN_SIDE_PX = 10
-# A blurred crop spreads its probability over everything, and a third of ImageNet's classes are
-# animals: the more classes a group has, the more of the probability it must gather.
-SHARE_PER_ROOT_CLASS = 0.0625
-MAX_NEEDED_SHARE = 0.9
+MIN_SIDE_PX = 8
+# The share of the probability that a group must gather, measured on the demo's boxes. A blurred
+# crop spreads it over everything, and there are far more classes of things than of vehicles.
+VEHICLE_SHARE = 0.25
+OTHER_SHARE = 0.60
 MIN_CLASS_PROBABILITY = 0.5
 MOTION_WINDOW_FRAMES = 12
 # Over about a second: a box that grows by 1.4 is less than 2.5 s from contact.
 GROWTH = 1.4
 SIDEWAYS_WIDTHS = 1.0
+
+VEHICLES = frozenset({"car", "truck", "bus", "motorcycle", "bicycle"})
 
 # Groups that name something which can be on a road, and the noun the agent uses for each.
 NOUNS = {
@@ -67,10 +65,6 @@ class EmbeddedVisionAgent:
         self._nouns: dict[tuple[str, int, str], str | None] = {}
         groups = np.array(classifier.groups)
         self._members = {group: np.flatnonzero(groups == group) for group in NOUNS}
-        self._needed = {
-            group: min(MAX_NEEDED_SHARE, SHARE_PER_ROOT_CLASS * len(members) ** 0.5)
-            for group, members in self._members.items()
-        }
 
     def look(self, frames: Sequence[Frame], prompt: Prompt, call: int) -> Reply:
         """One frame: a sentence an object. More: a comma list over a seeded half of the frames.
@@ -107,7 +101,7 @@ class EmbeddedVisionAgent:
         for key, box in zip(keys, frame.boxes, strict=True):
             if key not in self._nouns:
                 self._nouns[key] = None
-                picture = crop(frame.rgb, box.box, CROP_CONTEXT)
+                picture = context_crop(frame.rgb, box.box)
                 if picture is not None and min(box.box.width_px, box.box.height_px) >= MIN_SIDE_PX:
                     new.append((key, picture))
         if new:
@@ -120,8 +114,10 @@ class EmbeddedVisionAgent:
 
     def _noun(self, probabilities: NDArray[np.float32]) -> str | None:
         """The noun for one crop's class probabilities, shape (1000,); None where it is a guess."""
-        shares = {group: float(probabilities[self._members[group]].sum()) for group in NOUNS}
-        evidence = {group: shares[group] / self._needed[group] for group in NOUNS}
+        evidence = {
+            group: float(probabilities[members].sum()) / (VEHICLE_SHARE if group in VEHICLES else OTHER_SHARE)
+            for group, members in self._members.items()
+        }
         group = max(NOUNS, key=lambda name: evidence[name])
         if evidence[group] < 1:
             return None

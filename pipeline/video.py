@@ -214,17 +214,14 @@ def read_keyframes(path: Path, video_id: str, count: int = 25) -> Keyframes:
     return Keyframes(video, frames, "; ".join(notes))
 
 
-def crop(rgb: RgbImage, box: Box, context: float = 0.0) -> RgbImage | None:
-    """The part of a frame (H, W, 3) inside `box`, grown by `context` of its size on every side.
+def crop(rgb: RgbImage, box: Box) -> RgbImage | None:
+    """The part of a frame (H, W, 3) inside `box`, rounded outwards to whole pixels.
 
     Cut off at the frame's edges; None when nothing of the box lies inside the frame.
     """
     height_px, width_px = rgb.shape[:2]
-    grow_x, grow_y = context * box.width_px, context * box.height_px
-    x1 = max(0, int(np.floor(box.x1_px - grow_x)))
-    y1 = max(0, int(np.floor(box.y1_px - grow_y)))
-    x2 = min(width_px, int(np.ceil(box.x2_px + grow_x)))
-    y2 = min(height_px, int(np.ceil(box.y2_px + grow_y)))
+    x1, y1 = max(0, int(np.floor(box.x1_px))), max(0, int(np.floor(box.y1_px)))
+    x2, y2 = min(width_px, int(np.ceil(box.x2_px))), min(height_px, int(np.ceil(box.y2_px)))
     if x1 >= x2 or y1 >= y2:
         return None
     return rgb[y1:y2, x1:x2]

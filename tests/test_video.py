@@ -134,6 +134,3 @@ def test_crop_by_hand() -> None:
     assert outside is not None
     assert outside.shape == (2, 3, 3)
     assert crop(rgb, Box(25, 0, 30, 5)) is None
-    grown = crop(rgb, Box(4, 4, 6, 6), context=0.5)
-    assert grown is not None
-    assert grown.shape == (4, 4, 3)
