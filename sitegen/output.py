@@ -108,6 +108,7 @@ def open_output(folder: Path) -> Output:
     except (OSError, ValueError):
         before = {}
     usable = isinstance(before, dict) and before.get("format") == FORMAT
+    usable = usable and all(isinstance(before.get(part), dict) for part in ("files", "media"))
     return Output(folder, before if usable else {})
 
 

@@ -4,23 +4,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.records import Kind, TrackBox, TruthHazard
-from sitegen.contexts import (
+from sitegen.contexts import Fact, Link, Shell
+from sitegen.gathered import KeyframePicture, SiteData, System, VideoMedia
+from sitegen.numerals import number, plural, score, seconds
+from sitegen.verdicts import best_pairs, cosine_score, title_of, verdict
+from sitegen.video_contexts import (
     CaptionView,
     CropView,
-    Fact,
     FilmFrame,
-    Link,
     MatrixRow,
     OverlayBox,
-    Shell,
     SystemView,
     Transcript,
     TruthView,
     VideoPage,
 )
-from sitegen.gathered import KeyframePicture, SiteData, System, VideoMedia
-from sitegen.numerals import number, plural, score, seconds
-from sitegen.verdicts import best_pairs, cosine_score, title_of, verdict
 from sitegen.words import difference, shorten, visible
 
 

@@ -6,15 +6,7 @@ from typing import TypeAlias
 
 from pipeline import __version__
 from sitegen import charts
-from sitegen.contexts import (
-    LeaderboardPage,
-    Link,
-    MethodPage,
-    Shell,
-    SubmissionPage,
-    VideoPage,
-    VideosPage,
-)
+from sitegen.contexts import LeaderboardPage, Link, MethodPage, Shell, SubmissionPage, VideosPage
 from sitegen.gathered import SiteData
 from sitegen.page_board import board_csv, board_json, leaderboard_page, video_href, videos_page
 from sitegen.page_method import method_page
@@ -22,6 +14,7 @@ from sitegen.page_submission import submission_page
 from sitegen.page_video import Place, video_page
 from sitegen.transcript import transcript
 from sitegen.verdicts import title_of
+from sitegen.video_contexts import VideoPage
 from sitegen.words import shorten, visible
 
 Context: TypeAlias = LeaderboardPage | VideosPage | VideoPage | SubmissionPage | MethodPage

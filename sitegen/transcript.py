@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from pipeline.records import Exclusion, Kind, Match, Snippet, Stage, StageOutput, TrackBox
-from sitegen.contexts import Saying, StageView, TrackCheck, Transcript
 from sitegen.gathered import System
 from sitegen.numerals import plural, score
+from sitegen.video_contexts import Saying, StageView, TrackCheck, Transcript
 from sitegen.words import shorten, visible
 
 STAGES: dict[Stage, tuple[str, str]] = {

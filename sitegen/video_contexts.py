@@ -1,0 +1,183 @@
+"""What the template of a video's page is given; texts come ready to print, paths are from the site's root."""
+
+from dataclasses import dataclass
+
+from sitegen.contexts import Fact, Link, Shell
+from sitegen.numerals import Score
+from sitegen.words import Diff
+
+
+@dataclass(frozen=True, slots=True)
+class OverlayBox:
+    """A box in viewBox units (the video's pixels); texts are numbers for attributes."""
+
+    x: str
+    y: str
+    width: str
+    height: str
+    text_y: str
+    track: str
+    hazard: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FilmFrame:
+    """A keyframe in the strip."""
+
+    number: int
+    index: int
+    time: str
+    thumb: str
+    full: str
+    alt: str
+    boxes: tuple[OverlayBox, ...]
+    is_cover: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CropView:
+    """A crop with what was said about its track."""
+
+    picture: str
+    width: int
+    height: int
+    alt: str
+    track: str
+    hazard: bool
+    detail: str
+    seen_as: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthView:
+    """A truth hazard."""
+
+    hazard_id: str
+    label: str
+    description: str
+    where: str
+
+
+@dataclass(frozen=True, slots=True)
+class CaptionView:
+    """A prediction, against the truth hazard it matches best."""
+
+    rank: int
+    label: str
+    text: str
+    tracks: str
+    hazard_id: str
+    score: Score | None
+    note: str
+    diff: Diff
+
+
+@dataclass(frozen=True, slots=True)
+class SystemView:
+    """All that one system said about the video."""
+
+    slug: str
+    name: str
+    agents: str
+    is_baseline: bool
+    besm: Score
+    sam: Score
+    verdict: str
+    verdict_text: str
+    captions: tuple[CaptionView, ...]
+    empty_text: str
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixRow:
+    """A prediction's cosine with every truth hazard; `chosen` numbers the match."""
+
+    system: str
+    first_of_system: bool
+    span: int
+    rank: int
+    text: str
+    cells: tuple[Score, ...]
+    chosen: int
+
+
+@dataclass(frozen=True, slots=True)
+class Saying:
+    """One thing that a stage said; `times` counts equal answers in a row, as text or empty."""
+
+    where: str
+    times: str
+    items: tuple[tuple[str, str], ...]
+    reply: str
+    parse: str
+
+
+@dataclass(frozen=True, slots=True)
+class StageView:
+    """A stage of one system on one video."""
+
+    code: str
+    name: str
+    meaning: str
+    agent: str
+    prompt_id: str
+    calls: str
+    sayings: tuple[Saying, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackCheck:
+    """The verification of one track: how many snippets counted, why others did not, what matched."""
+
+    track: str
+    hazard: bool
+    snippets: str
+    excluded: str
+    best_label: str
+    best: Score | None
+    detected: str
+    in_aos: str
+
+
+@dataclass(frozen=True, slots=True)
+class Transcript:
+    """What every stage of one system said about the video."""
+
+    slug: str
+    name: str
+    summary: str
+    stages: tuple[StageView, ...]
+    tracks: tuple[TrackCheck, ...]
+    tracks_summary: str
+    error: str
+
+
+@dataclass(frozen=True, slots=True)
+class VideoPage:
+    """videos/<name>.html"""
+
+    shell: Shell
+    video_id: str
+    heading: str
+    facts: tuple[Fact, ...]
+    truth: tuple[TruthView, ...]
+    problem: str
+    note: str
+    width: int
+    height: int
+    frames: tuple[FilmFrame, ...]
+    cover: FilmFrame | None
+    clip: str
+    has_boxes: bool
+    crops: tuple[CropView, ...]
+    systems: tuple[SystemView, ...]
+    matrix_columns: tuple[TruthView, ...]
+    matrix: tuple[MatrixRow, ...]
+    transcripts: tuple[Transcript, ...]
+    unrecorded: str
+    threshold: str
+    threshold_share: int
+    label_px: str
+    previous: Link | None
+    following: Link | None
+    place: str
