@@ -207,5 +207,7 @@ class CachedEmbedder:
                 f"{self._folder}: cannot be written ({error.strerror}); expected a folder for vectors. "
                 "Set COOOLER_CACHE to a folder that can be written."
             ) from error
-        self._segments[name] = _Segment(self._folder / name)
+        # Another process may have merged it already; then it is found there when it is asked for.
+        with contextlib.suppress(FileNotFoundError):
+            self._segments[name] = _Segment(self._folder / name)
         return name

@@ -4,6 +4,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,8 +108,9 @@ def find_templates() -> Path:
     raise OutsideError(f"{here}: the templates are missing. Install COOOLER again.")
 
 
+@cache
 def environment() -> Environment:
-    """The jinja environment: everything escaped, an undefined name is an error."""
+    """The jinja environment: everything escaped, an undefined name is an error; one a process."""
     return Environment(
         loader=FileSystemLoader(find_templates()),
         autoescape=True,

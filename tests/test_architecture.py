@@ -23,7 +23,7 @@ FLOORS = [
     ["pipeline.cli"],
     ["sitegen.__init__", "sitegen.words", "sitegen.numerals", "sitegen.blocks"],
     ["sitegen.checks", "sitegen.score", "sitegen.ledger", "sitegen.output", "sitegen.contexts"],
-    ["sitegen.about", "sitegen.evaluate", "sitegen.gathered", "sitegen.formats"],
+    ["sitegen.about", "sitegen.evaluate", "sitegen.gathered", "sitegen.formats", "sitegen.video_contexts"],
     ["sitegen.sheets", "sitegen.media", "sitegen.transcript", "sitegen.verdicts", "sitegen.leaderboard"],
     ["sitegen.readers", "sitegen.charts", "sitegen.serve"],
     ["sitegen.submissions"],

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipeline.errors import OutsideError
+from pipeline.files import write_bytes
 from pipeline.files import sha256_of
 from pipeline.vector_cache import CachedEmbedder
 
@@ -136,6 +137,19 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutsideError, match="Set COOOLER_CACHE"):
         CachedEmbedder(Counting(), tmp_path / "file").embed(["x"])
+
+
+def test_a_segment_that_is_merged_away_at_once_does_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone_at_once(path: Path, data: bytes) -> None:
+        write_bytes(path, data)
+        path.unlink()
+
+    monkeypatch.setattr("pipeline.vector_cache.write_bytes", gone_at_once)
+    cached = CachedEmbedder(Counting(), tmp_path)
+    assert np.array_equal(cached.embed(["x"]), Counting().embed(["x"]))
+    assert np.array_equal(cached.embed(["x"]), Counting().embed(["x"]))
 
 
 def test_processes_share_the_cache_without_harm(tmp_path: Path) -> None:
