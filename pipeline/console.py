@@ -19,10 +19,10 @@ def stderr() -> "Console":
 
 
 def stdout() -> "Console":
-    """A console on standard output."""
+    """A console on standard output; in a file or a pipe, wide enough that tables stay whole."""
     from rich.console import Console
 
-    return Console(highlight=False)
+    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 
 
 def print_json(value: Any) -> None:

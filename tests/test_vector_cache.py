@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipeline.errors import OutsideError
-from pipeline.files import write_bytes
-from pipeline.files import sha256_of
+from pipeline.files import sha256_of, write_bytes
 from pipeline.vector_cache import CachedEmbedder
 
 ROOT = Path(__file__).parent.parent
