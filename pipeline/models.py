@@ -6,7 +6,7 @@ Everything is found without importing the packages that carry the models.
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline import classifier, minilm
+from pipeline import classifier, clip, local_llm, minilm
 from pipeline.chunks import MODEL_PACKAGES
 from pipeline.files import sha256_file, sha256_of
 from pipeline.weights import package_folder
@@ -26,12 +26,30 @@ class ModelStatus:
     install: str
 
 
-def known_models() -> list[ModelStatus]:
-    """Every model that has a default, found or not.
+def known_models(clip_folder: str = "") -> list[ModelStatus]:
+    """Every model that has a default, found or not; CLIP when a configuration names its folder.
 
-    Raises InputError or ModelMissingError when COOOLER_EMBEDDER names what cannot be an embedder.
+    Raises InputError or ModelMissingError when COOOLER_EMBEDDER names what cannot be an embedder,
+    InputError when `clip_folder` holds no CLIP.
     """
-    return [_embedder(), _classifier(), _noun_chunks()]
+    found = [_embedder(), _classifier(), _noun_chunks(), _local_llm()]
+    return [*found, _clip(Path(clip_folder))] if clip_folder else found
+
+
+def _clip(folder: Path) -> ModelStatus:
+    matcher = clip.ClipMatcher(folder)
+    install = "any ONNX export of CLIP with its projections, in a folder of yours (clip_folder)"
+    return ModelStatus(
+        "image-text matcher", matcher.name, folder, matcher.sha256, "unknown: your own folder", install
+    )
+
+
+def _local_llm() -> ModelStatus:
+    parts = local_llm.find_parts()
+    path, sha256 = (parts[0].parent, local_llm.SHA256) if parts else (None, None)
+    return ModelStatus(
+        "language model, optional", local_llm.NAME, path, sha256, local_llm.LICENCE, local_llm.INSTALL
+    )
 
 
 def _embedder() -> ModelStatus:

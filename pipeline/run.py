@@ -1,38 +1,41 @@
 """One video through the pipeline, and all videos through an executor: resumable, atomic.
 
-A run folder holds the tables, and in `parts/<video id>/` those of each finished video. A part
-is used again when it was made from the same clip, boxes, configuration and models.
+A run folder holds the tables, and in `parts/<video id>/` those of each finished video. Parts are
+written here and not by the workers, each as soon as it comes, the `outcomes` table last: it vouches
+for the others. A part is used again when it was made from the same clip, boxes, configuration and
+models, so a run that was stopped in any way goes on where it was.
 """
 
+import io
 import json
 import re
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from pipeline import __version__
-from pipeline.classifier import ConseMatcher, CropClassifier, open_classifier
 from pipeline.config import RunConfig
-from pipeline.embedded_language import EmbeddedLanguageAgent
-from pipeline.embedded_vision import EmbeddedVisionAgent
 from pipeline.errors import AgentError, CooolerError, Fault, FaultsError, InputError, VideoError
-from pipeline.files import sha256_file, sha256_of, write_text
-from pipeline.interfaces import Embedder, Executor
-from pipeline.minilm import open_embedder
-from pipeline.records import Stage, StageOutput, TrackBox, VideoOutcome
-from pipeline.stages import Agents, run_stages
+from pipeline.files import sha256_file, sha256_of
+from pipeline.interfaces import Executor
+from pipeline.places import Place
+from pipeline.records import Stage, TrackBox, VideoOutcome
+from pipeline.stages import run_stages
 from pipeline.table import Table, metadata
-from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES
+from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES, USAGE
+from pipeline.team import NO_SERVICES, Services, close_connections, open_team
+from pipeline.usage import usage_of
 from pipeline.verify import verify
 from pipeline.video import read_keyframes
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".ts"})
 SAFE_ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,127}")
 
-RUN_TABLES: tuple[Table[Any], ...] = (STAGES, SNIPPETS, MATCHES, PREDICTIONS, OUTCOMES)
+# The outcome comes last: it vouches for the rest of a part.
+RUN_TABLES: tuple[Table[Any], ...] = (STAGES, SNIPPETS, MATCHES, PREDICTIONS, USAGE, OUTCOMES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +43,10 @@ class Job:
     """One video to run: picklable, and all that its result depends on."""
 
     video_id: str
-    path: Path
+    clip: Place
     boxes: tuple[TrackBox, ...]
     config: RunConfig
-    part: Path
+    services: Services = NO_SERVICES
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,56 +64,44 @@ class VideoRun:
         return found
 
 
-def find_videos(folder: Path) -> list[Path]:
+def find_videos(folder: Place) -> list[Place]:
     """The video files in a folder, sorted by name.
 
     Raises FaultsError for names that cannot be an id and for two files with one stem.
     """
-    if not folder.is_dir():
+    if not folder.is_folder():
         raise InputError(f"{folder}: no such folder; expected a folder of video files (--videos).")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
-    faults = [
-        Fault(
-            str(path), None, None, f"the file name {path.name!r}", "a stem of A-Z a-z 0-9 . _ -", "Rename it."
-        )
-        for path in paths
-        if not SAFE_ID.fullmatch(path.stem)
-    ]
-    stems = [path.stem for path in paths]
-    faults += [
-        Fault(str(path), None, None, f"a second file for video {path.stem}", "one", "Remove or rename one.")
-        for place, path in enumerate(paths)
-        if path.stem in stems[:place]
-    ]
+    places = [place for place in folder.files() if Path(place.name).suffix.lower() in VIDEO_SUFFIXES]
+    faults = []
+    stems: set[str] = set()
+    for place in places:
+        stem = video_id_of(place)
+        if not SAFE_ID.fullmatch(stem):
+            found, expected = f"the file name {place.name!r}", "a stem of A-Z a-z 0-9 . _ -"
+            faults.append(Fault(str(place), None, None, found, expected, "Rename it."))
+        if stem in stems:
+            found = f"a second file for video {stem}"
+            faults.append(Fault(str(place), None, None, found, "one", "Remove or rename one."))
+        stems.add(stem)
     if faults:
         raise FaultsError(faults)
-    if not paths:
+    if not places:
         kinds = " ".join(sorted(VIDEO_SUFFIXES))
         raise InputError(f"{folder}: found no video file; expected files ending in {kinds}.")
-    return paths
+    return places
 
 
-@cache
-def _models() -> tuple[CropClassifier, Embedder, ConseMatcher]:
-    """The embedded models, once a process; one thread each, since videos run in parallel."""
-    classifier, embedder = open_classifier(threads=1), open_embedder(threads=1)
-    return classifier, embedder, ConseMatcher(classifier, embedder)
-
-
-def agent_names(config: RunConfig) -> str:
-    """One line that says which agents a configuration uses; goes into files and onto pages."""
-    track2 = "" if config.track2.enabled else "; without Track 2"
-    return (
-        f"{EmbeddedVisionAgent.name}; {EmbeddedLanguageAgent.name}; ConSE baseline in place of CLIP{track2}"
-    )
+def video_id_of(clip: Place) -> str:
+    """A video's id is its file's stem."""
+    return Path(clip.name).stem
 
 
 def part_sha256(job: Job) -> str:
     """Hash of all that a video's result depends on."""
-    classifier, embedder, _ = _models()
     boxes = BOXES.to_arrow(job.boxes).to_pylist()
-    clip = sha256_file(job.path)
-    key = [__version__, clip, boxes, job.config.sha256, classifier.sha256, embedder.sha256, _code_sha256()]
+    team = open_team(job.config, job.services).sha256
+    prices = {model: price.model_dump() for model, price in job.config.prices.items()}
+    key = [__version__, job.clip.identity(), boxes, job.config.sha256, prices, team, _code_sha256()]
     return sha256_of(json.dumps(key).encode())
 
 
@@ -123,34 +114,30 @@ def _code_sha256() -> str:
 
 
 def run_video(job: Job) -> VideoRun:
-    """One video: from its part when that still holds, else anew. A broken video gives an outcome
-    with an error, not an exception."""
-    key = part_sha256(job) if job.path.is_file() else ""
-    if key and (tables := _read_part(job.part, key)) is not None:
-        return VideoRun(job.video_id, True, tables)
+    """One video. A broken one gives an outcome with an error, not an exception."""
     try:
-        tables = _process(job)
-    except (VideoError, AgentError) as error:
-        return _failed(job, str(error))
+        with job.clip.as_path() as path:
+            return VideoRun(job.video_id, False, _process(job, path))
+    except (VideoError, AgentError, FileNotFoundError) as error:
+        return lost_video(job, str(error))
     except CooolerError:
         raise
     except Exception as error:  # one video must not end the run of all
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(last.filename).name}:{last.lineno}"
-        return _failed(job, f"{job.path}: {type(error).__name__} at {where}: {error}")
-    _write_part(job.part, tables, key)
-    return VideoRun(job.video_id, False, tables)
+        return lost_video(job, f"{job.clip}: {type(error).__name__} at {where}: {error}")
 
 
-def _failed(job: Job, error: str) -> VideoRun:
-    outcome = VideoOutcome(job.video_id, job.path.name, 0, 0.0, 0, 0, error)
+def lost_video(job: Job, error: str) -> VideoRun:
+    """The run of a video that could not be run, with the reason in its outcome."""
+    outcome = VideoOutcome(job.video_id, job.clip.name, 0, 0.0, 0, 0, error)
     tables: dict[str, Sequence[Any]] = {table.name: () for table in RUN_TABLES}
     return VideoRun(job.video_id, False, {**tables, OUTCOMES.name: (outcome,)})
 
 
-def _process(job: Job) -> dict[str, Sequence[Any]]:
+def _process(job: Job, path: Path) -> dict[str, Sequence[Any]]:
     config = job.config
-    keyframes = read_keyframes(job.path, job.video_id, config.frames.count)
+    keyframes = read_keyframes(path, job.video_id, config.frames.count)
     by_frame: dict[int, list[TrackBox]] = {}
     for track_box in job.boxes:
         by_frame.setdefault(track_box.frame_index, []).append(track_box)
@@ -158,18 +145,15 @@ def _process(job: Job) -> dict[str, Sequence[Any]]:
         replace(frame, boxes=tuple(sorted(by_frame.get(frame.index, []), key=lambda box: box.track_id)))
         for frame in keyframes.frames
     ]
-    classifier, embedder, matcher = _models()
-    vision = EmbeddedVisionAgent(classifier, {job.video_id: job.boxes}, config.seed)
-    agents = Agents(vision, vision, EmbeddedLanguageAgent(embedder))
-    outputs = run_stages(job.video_id, frames, agents, config)
-    cos = _last(outputs, Stage.COS) or _last(outputs, Stage.RHS)
-    aos = _last(outputs, Stage.AOS)
-    assert cos is not None and aos is not None
-    checked = verify(job.video_id, frames, cos.items, aos.items, matcher, config.verify)
+    team = open_team(config, job.services)
+    outputs = run_stages(job.video_id, frames, team.agents({job.video_id: job.boxes}), config)
+    # Without Track 2 the RHS stands in for the COS.
+    cos = [output for output in outputs if output.stage in (Stage.COS, Stage.RHS)][-1]
+    checked = verify(job.video_id, frames, cos.items, outputs[-1].items, team.matcher, config.verify)
     video = keyframes.video
     outcome = VideoOutcome(
         job.video_id,
-        job.path.name,
+        job.clip.name,
         video.frame_count,
         video.fps_hz,
         video.width_px,
@@ -182,37 +166,35 @@ def _process(job: Job) -> dict[str, Sequence[Any]]:
         SNIPPETS.name: checked.snippets,
         MATCHES.name: checked.matches,
         PREDICTIONS.name: checked.predictions,
+        USAGE.name: usage_of(outputs, config.models, config.prices),
         OUTCOMES.name: (outcome,),
     }
 
 
-def _last(outputs: Sequence[StageOutput], stage: Stage) -> StageOutput | None:
-    return next((output for output in reversed(outputs) if output.stage is stage), None)
-
-
-def _read_part(part: Path, key: str) -> dict[str, Sequence[Any]] | None:
-    """The tables of a part made for `key`, or None. The outcome is written last: it vouches."""
+def _read_part(part: Place, key: str) -> dict[str, Sequence[Any]] | None:
+    """The tables of a part made for `key`, or None."""
     try:
-        if metadata(part / "outcomes.parquet").get("part_sha256") != key:
+        if metadata(io.BytesIO((part / "outcomes.parquet").read())).get("part_sha256") != key:
             return None
-        return {table.name: table.read(part / f"{table.name}.parquet") for table in RUN_TABLES}
+        files = {table: part / f"{table.name}.parquet" for table in RUN_TABLES}
+        return {table.name: table.from_bytes(place.read(), str(place)) for table, place in files.items()}
     except (OSError, ValueError, FaultsError):
         return None
 
 
-def _write_part(part: Path, tables: Mapping[str, Sequence[Any]], key: str) -> None:
-    (part / "outcomes.parquet").unlink(missing_ok=True)
+def _write_part(part: Place, tables: Mapping[str, Sequence[Any]], key: str) -> None:
+    (part / "outcomes.parquet").remove()
     for table in RUN_TABLES:
-        table.write(part / f"{table.name}.parquet", tables[table.name], {"part_sha256": key})
+        (part / f"{table.name}.parquet").write(table.to_bytes(tables[table.name], {"part_sha256": key}))
 
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """What a run did: outcomes sorted by id, how many videos were taken from parts."""
+    """What a run did: outcomes sorted by id, how many videos were taken from parts, what is there."""
 
     outcomes: tuple[VideoOutcome, ...]
     reused: int
-    predictions: int
+    tables: Mapping[str, Sequence[Any]]
 
     @property
     def failed(self) -> tuple[VideoOutcome, ...]:
@@ -221,44 +203,67 @@ class RunReport:
 
 
 def predict(
-    videos: Sequence[Path],
+    clips: Sequence[Place],
     boxes: Sequence[TrackBox],
     config: RunConfig,
-    out: Path,
+    out: Place,
     executor: Executor,
+    *,
+    services: Services = NO_SERVICES,
+    only: Collection[str] = (),
     done: Callable[[VideoRun], None] = lambda run: None,
 ) -> RunReport:
-    """Run all `videos` and write the tables of the run to `out`; `done` is told of each video.
+    """Run the clips and write the tables of the run to `out`; `done` is told of each video.
 
-    The bytes depend on the inputs alone, not on the executor or on what was resumed.
+    With `only`, just these videos are run, and of the others what earlier runs left is kept. The
+    bytes depend on the inputs and the answers alone, not on the executor or on what was resumed.
     """
     by_video: dict[str, list[TrackBox]] = {}
     for track_box in boxes:
         by_video.setdefault(track_box.video_id, []).append(track_box)
     jobs = [
-        Job(path.stem, path, tuple(by_video.get(path.stem, [])), config, out / "parts" / path.stem)
-        for path in videos
+        Job(video_id_of(clip), clip, tuple(by_video.get(video_id_of(clip), [])), config, services)
+        for clip in clips
     ]
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "run.json", json.dumps(config.model_dump(mode="json"), indent=2, sort_keys=True) + "\n")
-    runs = []
-    for run in _stream(executor, jobs):
-        done(run)
-        runs.append(run)
+    unknown = sorted(set(only) - {job.video_id for job in jobs})
+    if unknown:
+        raise InputError(f"found no clip for {', '.join(unknown)}; expected ids of the videos (--only).")
+    settings = json.dumps(config.model_dump(mode="json"), indent=2, sort_keys=True)
+    (out / "run.json").write(f"{settings}\n".encode())
     marks = {
         "config_sha256": config.sha256,
         "config": json.dumps(config.model_dump(mode="json"), sort_keys=True),
-        "agents": agent_names(config),
+        "agents": open_team(config, services).names,
         "coooler_version": __version__,
     }
+    runs = []
+    try:
+        for run in _runs(jobs, out / "parts", executor, only):
+            done(run)
+            runs.append(run)
+    finally:
+        close_connections()
+    rows = {table.name: [row for run in runs for row in run.tables[table.name]] for table in RUN_TABLES}
     for table in RUN_TABLES:
-        rows = [row for run in runs for row in run.tables[table.name]]
-        table.write(out / f"{table.name}.parquet", rows, marks)
-    outcomes = tuple(sorted((run.outcome for run in runs), key=lambda outcome: outcome.video_id))
-    return RunReport(
-        outcomes, sum(run.reused for run in runs), sum(len(run.tables["predictions"]) for run in runs)
-    )
+        (out / f"{table.name}.parquet").write(table.to_bytes(rows[table.name], marks))
+    outcomes = tuple(sorted(rows[OUTCOMES.name], key=lambda outcome: outcome.video_id))
+    return RunReport(outcomes, sum(run.reused for run in runs), rows)
 
 
-def _stream(executor: Executor, jobs: Sequence[Job]) -> Iterator[VideoRun]:
-    yield from executor.run(run_video, jobs)
+def _runs(jobs: Sequence[Job], parts: Place, executor: Executor, only: Collection[str]) -> Iterator[VideoRun]:
+    """The run of each job: from its part when that still holds, else from the executor."""
+    keys: dict[str, str] = {}
+    todo = []
+    for job in jobs:
+        key = keys[job.video_id] = part_sha256(job)
+        tables = None if job.video_id in only else _read_part(parts / job.video_id, key)
+        if tables is not None:
+            yield VideoRun(job.video_id, True, tables)
+        elif only and job.video_id not in only:
+            yield lost_video(job, "not run yet")
+        else:
+            todo.append(job)
+    for run in executor.run(run_video, todo, lost_video):
+        if not run.outcome.error:
+            _write_part(parts / run.video_id, run.tables, keys[run.video_id])
+        yield run

@@ -8,8 +8,9 @@ Every step gives `StageOutput`s; an answer without items makes an empty stage, n
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 
 from pipeline.chunks import noun_chunks, without_article
 from pipeline.config import RunConfig
@@ -18,14 +19,17 @@ from pipeline.parsing import parse
 from pipeline.prompts import fill
 from pipeline.records import Frame, Item, Parse, Reply, Stage, StageOutput
 
+REPAIR_HINT = "Your last answer to this could not be read. "
+
 
 @dataclass(frozen=True, slots=True)
 class Agents:
-    """Who answers in each role."""
+    """Who answers in each role, and how many questions may be open at once."""
 
     scene: VisionAgent
     video: VisionAgent
     language: LanguageAgent
+    in_flight: int = 1
 
 
 def run_stages(
@@ -36,29 +40,39 @@ def run_stages(
     Without Track 2 the RHS takes the place of the COS (ours), and no AES or COS is made.
     Raises AgentError when an agent does not answer.
     """
-    scenes = [
-        _look(agents.scene, "T1-VLM", Stage.SCENE, call, video_id, [frame], frame.index)
-        for call, frame in enumerate(frames)
-    ]
-    rhs = _complete(
-        agents.language, Stage.RHS, video_id, fill("T1-LLM", {"descriptions": [s.reply.text for s in scenes]})
-    )
-    outputs = [*scenes, rhs]
+
+    def scene(call: int) -> StageOutput:
+        frame = frames[call]
+        return _look(agents.scene, "T1-VLM", Stage.SCENE, call, video_id, [frame], frame.index)
+
+    def answer(call: int) -> StageOutput:
+        return _look(agents.video, "T2-VLM", Stage.ANSWER, call, video_id, frames, None)
+
+    language = agents.language
+    scenes = _all(scene, len(frames), agents.in_flight)
+    prompt = fill("T1-LLM", {"descriptions": [said.reply.text for said in scenes]})
+    rhs = _complete(language, Stage.RHS, video_id, prompt)
+    outputs = [*scenes, *rhs]
     cos = rhs
     if config.track2.enabled:
-        answers = [
-            _look(agents.video, "T2-VLM", Stage.ANSWER, call, video_id, frames, None)
-            for call in range(config.track2.queries)
-        ]
-        chunks = [_chunk(answer) for answer in answers]
-        lists = [", ".join(item.label for item in output.items) for output in chunks]
-        aes = _complete(agents.language, Stage.AES, video_id, fill("T2-LLM", {"lists": lists}))
-        aes = _without_articles(aes)
-        cross = fill("X-LLM", {"rhs": entries(rhs.items), "aes": entries(aes.items)})
-        cos = _complete(agents.language, Stage.COS, video_id, cross)
-        outputs += [*answers, *chunks, aes, cos]
-    aos = _complete(agents.language, Stage.AOS, video_id, fill("A-LLM", {"cos": entries(cos.items)}))
-    return [*outputs, aos]
+        answers = _all(answer, config.track2.queries, agents.in_flight)
+        chunks = [_chunk(said) for said in answers]
+        lists = [", ".join(item.label for item in said.items) for said in chunks]
+        aes = _complete(language, Stage.AES, video_id, fill("T2-LLM", {"lists": lists}))
+        aes[-1] = _without_articles(aes[-1])
+        cross = fill("X-LLM", {"rhs": entries(rhs[-1].items), "aes": entries(aes[-1].items)})
+        cos = _complete(language, Stage.COS, video_id, cross)
+        outputs += [*answers, *chunks, *aes, *cos]
+    aos = _complete(language, Stage.AOS, video_id, fill("A-LLM", {"cos": entries(cos[-1].items)}))
+    return [*outputs, *aos]
+
+
+def _all(ask: Callable[[int], StageOutput], count: int, in_flight: int) -> list[StageOutput]:
+    """The outputs of calls 0 .. count-1, in order, at most `in_flight` asked at once."""
+    if in_flight == 1:
+        return [ask(call) for call in range(count)]
+    with ThreadPoolExecutor(in_flight) as pool:
+        return list(pool.map(ask, range(count)))
 
 
 def entries(items: Sequence[Item]) -> list[str]:
@@ -94,11 +108,17 @@ def _look(
     return StageOutput(video_id, stage, call, prompt_id, key, reply, items, how, frame_index)
 
 
-def _complete(agent: LanguageAgent, stage: Stage, video_id: str, prompt: Prompt) -> StageOutput:
-    reply = agent.complete(prompt, 0)
-    items, how = parse(reply.text)
-    key = request_sha256(agent.name, prompt, [], 0)
-    return StageOutput(video_id, stage, 0, prompt.prompt_id, key, reply, items, how)
+def _complete(agent: LanguageAgent, stage: Stage, video_id: str, prompt: Prompt) -> list[StageOutput]:
+    """The answer, and when nothing in it could be parsed, the answer to one request to repair it."""
+    outputs = []
+    for call, asked in enumerate((prompt, replace(prompt, format_hint=REPAIR_HINT + prompt.format_hint))):
+        reply = agent.complete(asked, call)
+        items, how = parse(reply.text)
+        key = request_sha256(agent.name, asked, [], call)
+        outputs.append(StageOutput(video_id, stage, call, prompt.prompt_id, key, reply, items, how))
+        if how is not Parse.FAILED:
+            break
+    return outputs
 
 
 def _chunk(answer: StageOutput) -> StageOutput:
@@ -116,14 +136,4 @@ def _without_articles(output: StageOutput) -> StageOutput:
     """The AES with articles removed (paper), should the model have left them in."""
     labels = dict.fromkeys(without_article(item.label or item.description) for item in output.items)
     items = tuple(Item(rank, label, "") for rank, label in enumerate(filter(None, labels), start=1))
-    return StageOutput(
-        output.video_id,
-        output.stage,
-        output.call,
-        output.prompt_id,
-        output.request_sha256,
-        output.reply,
-        items,
-        output.parse,
-        output.frame_index,
-    )
+    return replace(output, items=items)

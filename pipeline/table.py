@@ -3,6 +3,7 @@
 Sorting makes the bytes a function of the rows alone, whatever order they came in.
 """
 
+import io
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.errors import Fault, FaultsError
-from pipeline.files import replacing
+from pipeline.files import write_bytes
 
 SCHEMA_VERSION = "1"
 
@@ -35,30 +36,42 @@ class Table(Generic[R]):
         rows = [self.to_row(record) for record in sorted(records, key=self.key)]
         return pa.Table.from_pylist(rows, schema=self.schema)
 
-    def write(self, path: Path, records: Iterable[R], metadata: Mapping[str, str] | None = None) -> None:
-        """Write the records, sorted by key, whole or not at all."""
+    def to_bytes(self, records: Iterable[R], metadata: Mapping[str, str] | None = None) -> bytes:
+        """The records, sorted by key, as the content of a Parquet file."""
         table = self.to_arrow(records)
         marks = {"schema_version": SCHEMA_VERSION, "table": self.name, **(metadata or {})}
         table = table.replace_schema_metadata({key: marks[key] for key in sorted(marks)})
-        with replacing(path) as temporary:
-            pq.write_table(table, temporary, compression="zstd", compression_level=3)
+        sink = io.BytesIO()
+        pq.write_table(table, sink, compression="zstd", compression_level=3)
+        return sink.getvalue()
+
+    def write(self, path: Path, records: Iterable[R], metadata: Mapping[str, str] | None = None) -> None:
+        """Write the records, sorted by key, whole or not at all."""
+        write_bytes(path, self.to_bytes(records, metadata))
 
     def read(self, path: Path) -> list[R]:
         """Read the records of a file that `write` made.
 
         Raises FaultsError when the file is no Parquet file or its columns are not these.
         """
+        return self._read(path, str(path))
+
+    def from_bytes(self, data: bytes, name: str) -> list[R]:
+        """Read the records of a file's content; `name` is how errors call it. Raises as `read` does."""
+        return self._read(io.BytesIO(data), name)
+
+    def _read(self, source: Path | io.BytesIO, path: str) -> list[R]:
         try:
-            file = pq.ParquetFile(path)
+            file = pq.ParquetFile(source)
         except (pa.ArrowException, OSError) as error:
-            fault = Fault(str(path), None, None, str(error), "a Parquet file", "Write it again.")
+            fault = Fault(path, None, None, str(error), "a Parquet file", "Write it again.")
             raise FaultsError([fault]) from error
         with file:
             found = {field.name: field.type for field in file.schema_arrow}
             wanted = {field.name: field.type for field in self.schema}
             faults = [
                 Fault(
-                    str(path),
+                    path,
                     None,
                     column,
                     str(found.get(column, "no such column")),
@@ -73,7 +86,7 @@ class Table(Generic[R]):
             return [self.from_row(row) for row in file.read(columns=list(wanted)).to_pylist()]
 
 
-def metadata(path: Path) -> dict[str, str]:
+def metadata(source: Path | io.BytesIO) -> dict[str, str]:
     """The text marks in a Parquet file's metadata (`schema_version`, `config_sha256`, ...)."""
-    marks = pq.read_schema(path).metadata or {}
+    marks = pq.read_schema(source).metadata or {}
     return {key.decode(): value.decode() for key, value in marks.items() if not key.startswith(b"ARROW")}

@@ -11,7 +11,6 @@ from pipeline.records import (
     Item,
     Kind,
     Match,
-    PairScore,
     Parse,
     Prediction,
     Reply,
@@ -20,9 +19,10 @@ from pipeline.records import (
     StageOutput,
     TrackBox,
     TruthHazard,
+    UsageRow,
     VideoOutcome,
-    VideoScore,
 )
+from pipeline.scores import PairScore, VideoScore
 from pipeline.table import Row, Table
 
 
@@ -229,6 +229,24 @@ OUTCOMES: Table[VideoOutcome] = Table(
     lambda row: VideoOutcome(**row),
 )
 
+USAGE: Table[UsageRow] = Table(
+    "usage",
+    _schema(
+        ("input_tokens", "output_tokens", "seconds", "cost"),
+        video_id=_STRING,
+        role=_STRING,
+        model=_STRING,
+        calls=_INT,
+        input_tokens=pa.int64(),
+        output_tokens=pa.int64(),
+        seconds=_REAL,
+        cost=_REAL,
+    ),
+    lambda row: (row.video_id, row.role),
+    _plain,
+    lambda row: UsageRow(**row),
+)
+
 PAIRS: Table[PairScore] = Table(
     "pairs",
     _schema(video_id=_STRING, prediction_rank=_INT, hazard_id=_STRING, cosine=_REAL, similarity=_REAL),
@@ -264,6 +282,7 @@ TABLES: tuple[Table[Any], ...] = (
     SNIPPETS,
     MATCHES,
     OUTCOMES,
+    USAGE,
     PAIRS,
     VIDEOS,
 )

@@ -3,9 +3,14 @@
 Every snippet (box crop) of every sampled frame is compared with every COS label. In each row of
 that matrix the entries in the top 10th percentile are *detected*; detected entries that share a
 label are grouped, and the groups whose label is in the AOS give the hazard's tracks and frames.
+
+The size limits cost the paper its small hazards. With `upscale` (ours) a snippet under the limits is
+not ignored: it is compared with what surrounds it, enlarged.
 """
 
-from collections.abc import Sequence
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +20,8 @@ from pipeline.config import VerifySettings
 from pipeline.interfaces import ImageTextMatcher
 from pipeline.records import Box, Exclusion, Frame, Item, Match, Prediction, RgbImage, Snippet
 from pipeline.video import crop
+
+LEAST_VISIBLE_PX = 4  # less than this of a box inside the frame is no picture of anything
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +49,54 @@ def exclusion(box: Box, width_px: int, height_px: int, limits: VerifySettings) -
     if box.area_px2 <= limits.min_area_px2 * scale**2:
         return Exclusion.AREA_TOO_SMALL
     return None
+
+
+def enlarged(rgb: RgbImage, box: Box, context: float, min_side_px: int) -> RgbImage | None:
+    """A square picture of a small box in a frame (H, W, 3), at least `min_side_px` a side (ours).
+
+    The square lies around the part of the box inside the frame, its side that part's longer side
+    grown by `context` of itself on both ends; pixels beyond the frame's edge repeat the edge. Cubic
+    interpolation where it is enlarged. None when less than 4 px of the box are inside, either way.
+    """
+    import cv2
+
+    height_px, width_px = rgb.shape[:2]
+    x1, x2 = (min(max(x, 0.0), float(width_px)) for x in (box.x1_px, box.x2_px))
+    y1, y2 = (min(max(y, 0.0), float(height_px)) for y in (box.y1_px, box.y2_px))
+    if not min(x2 - x1, y2 - y1) >= LEAST_VISIBLE_PX:  # NaN is no size either
+        return None
+    side = math.ceil(max(x2 - x1, y2 - y1) * (1 + 2 * context))
+    left, top = (math.floor((low + high - side) / 2) for low, high in ((x1, x2), (y1, y2)))
+    inside = rgb[max(top, 0) : top + side, max(left, 0) : left + side]
+    square = cv2.copyMakeBorder(
+        inside,
+        max(-top, 0),
+        max(top + side - height_px, 0),
+        max(-left, 0),
+        max(left + side - width_px, 0),
+        cv2.BORDER_REPLICATE,
+    )
+    if side < min_side_px:
+        square = cv2.resize(square, (min_side_px, min_side_px), interpolation=cv2.INTER_CUBIC)
+    return np.asarray(square, np.uint8)
+
+
+def exclusion_counts(snippets: Iterable[Snippet]) -> dict[Exclusion, int]:
+    """How many snippets each reason left out; every reason is there, 0 where it left out none."""
+    counts = Counter(snippet.excluded for snippet in snippets)
+    return {reason: counts[reason] for reason in Exclusion}
+
+
+def rescue_counts(
+    snippets: Iterable[Snippet], width_px: int, height_px: int, limits: VerifySettings
+) -> dict[Exclusion, int]:
+    """How many snippets of one video are compared only because of `upscale`, by the limit they miss.
+
+    `width_px` x `height_px` is the size of the frames; every reason is there.
+    """
+    kept = (snippet.track_box.box for snippet in snippets if snippet.excluded is None)
+    counts = Counter(exclusion(box, width_px, height_px, limits) for box in kept)
+    return {reason: counts[reason] for reason in Exclusion}
 
 
 def detected(cosines: NDArray[np.float32], top_percent: float) -> NDArray[np.bool_]:
@@ -75,9 +130,15 @@ def verify(
         height_px, width_px = frame.rgb.shape[:2]
         for track_box in frame.boxes:
             reason = exclusion(track_box.box, width_px, height_px, limits)
-            picture = None if reason else crop(frame.rgb, track_box.box)
-            if reason is None and picture is None:
-                reason = Exclusion.OUTSIDE_FRAME
+            picture = None
+            if reason is None:
+                picture = crop(frame.rgb, track_box.box)
+                reason = Exclusion.OUTSIDE_FRAME if picture is None else None
+            elif limits.upscale:
+                picture = enlarged(
+                    frame.rgb, track_box.box, limits.upscale_context, limits.upscale_min_side_px
+                )
+                reason = reason if picture is None else None
             snippet = Snippet(track_box, reason)
             snippets.append(snippet)
             if picture is not None:

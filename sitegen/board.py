@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from pipeline.benchmark import Benchmark
 from pipeline.minilm import open_embedder
-from pipeline.records import Evaluation
+from pipeline.scores import Evaluation
 from pipeline.table import metadata
-from pipeline.tables import MATCHES, OUTCOMES, SNIPPETS, STAGES
+from pipeline.tables import MATCHES, OUTCOMES, SNIPPETS, STAGES, USAGE
 from sitegen.build import BuildReport, build_site
 from sitegen.evaluate import embed_all, evaluate, texts_of, truth_sha256
 from sitegen.readers import read_predictions, read_truth
@@ -17,7 +17,7 @@ from sitegen.submissions import StoredSubmission, load_all, store
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-EXTRAS = (STAGES, SNIPPETS, MATCHES, OUTCOMES)
+EXTRAS = (STAGES, SNIPPETS, MATCHES, USAGE, OUTCOMES)
 
 
 def submit_file(
@@ -29,6 +29,7 @@ def submit_file(
     agents: str,
     date: str,
     replace: bool,
+    recording: Path | None = None,
 ) -> tuple[StoredSubmission, Evaluation]:
     """Check, score and store a predictions file, or those of a run folder with all its records.
 
@@ -52,6 +53,7 @@ def submit_file(
         read=read,
         original=path,
         extras=extras,
+        recording=recording,
         replace=replace,
     )
     return next((one, score) for one, score in evaluate_board(benchmark) if one.folder == folder)

@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pipeline.benchmark import Benchmark
 from pipeline.errors import OutsideError
 from pipeline.files import sha256_of
-from pipeline.records import Evaluation
+from pipeline.scores import Evaluation
 from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
 from sitegen.gathered import VideoMedia, path_names
 from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json

@@ -11,7 +11,8 @@ from pipeline.cli import JsonOption, app, main
 
 if TYPE_CHECKING:
     from pipeline.benchmark import Benchmark
-    from pipeline.records import Evaluation, Submission, TruthHazard
+    from pipeline.records import TruthHazard
+    from pipeline.scores import Evaluation, Submission
     from sitegen.readers import ReadPredictions
 
 __all__ = ["app", "main"]
@@ -105,7 +106,7 @@ def score(
 
 
 def _submission(name: str, read: "ReadPredictions") -> "Submission":
-    from pipeline.records import Submission
+    from pipeline.scores import Submission
 
     return Submission(name, "", "", "", read.source_format, read.predictions, read.warnings)
 
@@ -146,6 +147,9 @@ def submit(
     url: Annotated[str, typer.Option(help="Paper, code or project page (http or https).")] = "",
     agents: Annotated[str, typer.Option(help="Which models produced it, in one line.")] = "",
     date: Annotated[str, typer.Option(help="Date as YYYY-MM-DD. Default: today.")] = "",
+    recording: Annotated[
+        Path | None, typer.Option(help="Zip of its models' answers, as `recording export` writes it.")
+    ] = None,
     replace: Annotated[bool, typer.Option(help="Replace the submission of this name.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -154,7 +158,15 @@ def submit(
 
     benchmark = _here()
     stored, evaluation = submit_file(
-        benchmark, file, name, authors, url, agents, date or calendar_date.today().isoformat(), replace
+        benchmark,
+        file,
+        name,
+        authors,
+        url,
+        agents,
+        date or calendar_date.today().isoformat(),
+        replace,
+        recording,
     )
     _say_warnings(stored.submission.warnings)
     if as_json:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from pipeline import console
 from pipeline.benchmark import FILE_NAME, Benchmark, open_benchmark
-from pipeline.cli import run_with_progress
+from pipeline.cli import default_executor, run_with_progress, snippets_line
 from pipeline.config import read_run_config
 from pipeline.errors import ConfigError
 from pipeline.files import slug
-from pipeline.records import Evaluation
+from pipeline.places import Place
 from pipeline.run import find_videos
+from pipeline.scores import Evaluation
 from pipeline.tables import BOXES
 from sitegen.board import build_board, submit_file
 
@@ -45,12 +46,17 @@ def demo_folder(work: Path | None) -> Benchmark:
 def run_demo(out: Path, work: Path | None, workers: int) -> Sequence[Evaluation]:
     """Run the demo's configurations on its clips, submit them, build the site into `out`."""
     benchmark = demo_folder(work)
-    paths, boxes = find_videos(benchmark.videos), BOXES.read(benchmark.boxes)
+    clips, boxes = find_videos(Place(str(benchmark.videos))), BOXES.read(benchmark.boxes)
     for entry in benchmark.settings.demo:
         file = benchmark.root / entry.predictions
         if entry.run:
             file = benchmark.root / "runs" / slug(entry.name)
-            run_with_progress(paths, boxes, read_run_config(benchmark.root / entry.run), file, workers)
+            settings = read_run_config(benchmark.root / entry.run)
+            executor = default_executor(settings, workers, len(clips))
+            report = run_with_progress(clips, boxes, settings, Place(str(file)), executor)
+            console.stdout().print(f"{entry.name}: {snippets_line(report)}", markup=False, soft_wrap=True)
+        if not entry.board:
+            continue
         submit_file(
             benchmark, file, entry.name, entry.authors, entry.url, entry.agents, entry.date, replace=True
         )

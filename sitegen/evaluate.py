@@ -11,7 +11,8 @@ import numpy as np
 from pipeline.errors import Fault, FaultsError, InputError, OutsideError
 from pipeline.files import sha256_of
 from pipeline.interfaces import Embedder
-from pipeline.records import Evaluation, PairScore, Prediction, Signature, Submission, TruthHazard
+from pipeline.records import Prediction, TruthHazard
+from pipeline.scores import Evaluation, PairScore, Signature, Submission
 from sitegen.score import (
     METRIC_VERSION,
     Index,

@@ -6,7 +6,8 @@ from typing import TypeVar
 from pipeline.benchmark import Benchmark
 from pipeline.errors import ConfigError
 from pipeline.files import sha256_file
-from pipeline.records import Evaluation, Match, Snippet, StageOutput, TrackBox, TruthHazard, VideoOutcome
+from pipeline.records import Match, Snippet, StageOutput, TrackBox, TruthHazard, VideoOutcome
+from pipeline.scores import Evaluation
 from pipeline.table import Table
 from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES
 from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names

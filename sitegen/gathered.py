@@ -9,18 +9,16 @@ from typing import TypeVar
 from pipeline.config import BenchmarkSettings
 from pipeline.files import sha256_of, slug
 from pipeline.records import (
-    Evaluation,
     Kind,
     Match,
-    PairScore,
     Prediction,
     Snippet,
     StageOutput,
     TrackBox,
     TruthHazard,
     VideoOutcome,
-    VideoScore,
 )
+from pipeline.scores import Evaluation, PairScore, VideoScore
 
 V = TypeVar("V", PairScore, Prediction)
 

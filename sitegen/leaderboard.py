@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from pipeline.errors import InputError
-from pipeline.records import Evaluation
+from pipeline.scores import Evaluation
 
 Key: TypeAlias = Literal["besm", "sam", "detection_rate", "hazard_recall"]
 

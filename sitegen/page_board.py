@@ -5,7 +5,7 @@ import io
 import json
 from collections.abc import Sequence
 
-from pipeline.records import VideoScore
+from pipeline.scores import VideoScore
 from sitegen.contexts import (
     BoardRow,
     Chart,

@@ -56,8 +56,8 @@ def _video_pages(data: SiteData) -> Iterator[Page]:
         title = visible(title_of(data.truth[video_id]))
         about = shorten(f"{visible(video_id)}: {title}. Keyframes, boxes, and every system's captions.", 160)
         shell = _shell(data, f"{shorten(title, 60)} · {visible(video_id)}", about, "../", "videos")
-        boxes = data.boxes.get(video_id, ())
-        said = [made for system in data.systems if (made := transcript(system, video_id, boxes))]
+        boxes, media = data.boxes.get(video_id, ()), data.media[video_id]
+        said = [made for system in data.systems if (made := transcript(system, video_id, boxes, media))]
         where = Place(
             links[place - 1] if place else None,
             links[place + 1] if place + 1 < len(ids) else None,

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.records import Scorecard, Signature, VideoScore
+from pipeline.scores import Scorecard, Signature, VideoScore
 
 METRIC_VERSION = "1"
 

@@ -4,7 +4,9 @@
     submissions/<slug>/submission.toml      who sent it, and the hashes
                        predictions.parquet  what is scored
                        original.<ending>    the file as it came
-                       stages.parquet, snippets.parquet, matches.parquet, outcomes.parquet  (optional)
+                       stages.parquet, snippets.parquet, matches.parquet, usage.parquet,
+                       outcomes.parquet     what the pipeline noted (optional)
+                       recording.zip        every answer behind it (optional)
 
 Scores are never stored here: they are computed again from the predictions.
 """
@@ -19,17 +21,20 @@ from typing import Literal
 
 from pipeline.errors import FaultsError, InputError
 from pipeline.files import sha256_file, slug
-from pipeline.records import Submission, TruthHazard
-from pipeline.tables import MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES
+from pipeline.recording_zip import import_zip
+from pipeline.records import TruthHazard
+from pipeline.scores import Submission
+from pipeline.tables import MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES, USAGE
 from sitegen import about as about_file
 from sitegen import ledger
 from sitegen.about import About
 from sitegen.checks import visible
 from sitegen.readers import ReadPredictions, read_predictions
 
-EXTRAS = {table.name: table for table in (STAGES, SNIPPETS, MATCHES, OUTCOMES)}
+EXTRAS = {table.name: table for table in (STAGES, SNIPPETS, MATCHES, USAGE, OUTCOMES)}
 
 _PREDICTIONS = "predictions.parquet"
+_RECORDING = "recording.zip"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +67,14 @@ def store(
     read: ReadPredictions,
     original: Path,
     extras: Mapping[str, Path] | None = None,
+    recording: Path | None = None,
     replace: bool = False,
 ) -> Path:
     """Store a submission under `folder` (`submissions/`) and note it in the ledger; give its folder.
 
     `original` is the file that `read` came from; `extras` maps table names (`stages`, `snippets`,
-    `matches`, `outcomes`) to files. The same content again changes nothing. Raises InputError for
+    `matches`, `usage`, `outcomes`) to files; `recording` is a zip of the answers of its models, from
+    which others can rebuild the predictions. The same content again changes nothing. Raises InputError for
     a wrong name, date or url, for a name that is taken, and for content that differs from what is
     stored under the name unless `replace`; FaultsError for extras that are not such tables.
     """
@@ -77,8 +84,13 @@ def store(
         if table not in EXTRAS:
             raise InputError(f"Extra table '{table}' is unknown; expected one of {', '.join(EXTRAS)}.")
         EXTRAS[table].read(path)
+    if recording:
+        with tempfile.TemporaryDirectory() as scratch:
+            import_zip(recording, Path(scratch))
     with ledger.locked(folder), _building(folder) as new:
         about = _fill(new, read, original, extras, given)
+        if recording:
+            shutil.copyfile(recording, new / _RECORDING)
         place = slug(about.name)
         target = folder / place
         current = about_file.read(target) if target.exists() else None
@@ -226,7 +238,8 @@ def _same(target: Path, new: Path, current: About, about: About) -> bool:
             return False
     except FaultsError:
         return False
-    extras = [f"{table}.parquet" for table in EXTRAS if f"{table}.parquet" in files]
+    optional = [*(f"{table}.parquet" for table in EXTRAS), _RECORDING]
+    extras = [name for name in optional if name in files]
     return all(sha256_file(target / extra) == sha256_file(new / extra) for extra in extras)
 
 

@@ -5,8 +5,10 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from pipeline.records import Exclusion, Kind, Match, Snippet, Stage, StageOutput, TrackBox
-from sitegen.gathered import System
+from sitegen.figure2 import figure2
+from sitegen.gathered import System, VideoMedia
 from sitegen.numerals import plural, score
+from sitegen.thumbnails import snippet_pictures
 from sitegen.video_contexts import Saying, StageView, TrackCheck, Transcript
 from sitegen.words import shorten, visible
 
@@ -23,7 +25,9 @@ _MAX_REPLY = 4_000
 _MAX_LABELS = 6
 
 
-def transcript(system: System, video_id: str, boxes: Sequence[TrackBox]) -> Transcript | None:
+def transcript(
+    system: System, video_id: str, boxes: Sequence[TrackBox], media: VideoMedia
+) -> Transcript | None:
     """The records of a system on a video, or None when it left none."""
     records = system.records.get(video_id)
     if records is None:
@@ -50,6 +54,7 @@ def transcript(system: System, video_id: str, boxes: Sequence[TrackBox]) -> Tran
         tracks,
         _tracks_summary(records.snippets),
         visible(error),
+        figure2(records.stages, records.snippets, records.matches, snippet_pictures(media, records.snippets)),
     )
 
 

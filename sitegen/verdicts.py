@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from pipeline.records import PairScore, TruthHazard, VideoScore
+from pipeline.records import TruthHazard
+from pipeline.scores import PairScore, VideoScore
 from sitegen.gathered import System
 from sitegen.numerals import Score, score
 from sitegen.score import TOLERANCE

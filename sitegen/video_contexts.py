@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from sitegen.contexts import Fact, Link, Shell
+from sitegen.figure2 import Figure2
 from sitegen.numerals import Score
 from sitegen.words import Diff
 
@@ -150,6 +151,7 @@ class Transcript:
     tracks: tuple[TrackCheck, ...]
     tracks_summary: str
     error: str
+    figure: Figure2 | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from pipeline.benchmark import Benchmark, open_benchmark
 from pipeline.files import sha256_file, slug
 from pipeline.records import (
     Box,
-    Evaluation,
     Exclusion,
     Item,
     Kind,
@@ -22,11 +21,11 @@ from pipeline.records import (
     Snippet,
     Stage,
     StageOutput,
-    Submission,
     TrackBox,
     TruthHazard,
     VideoOutcome,
 )
+from pipeline.scores import Evaluation, Submission
 from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES, TRUTH
 from sitegen.evaluate import evaluate, truth_sha256
 from sitegen.readers import read_truth

@@ -13,18 +13,30 @@ ROOT = Path(__file__).parent.parent
 FLOORS = [
     ["pipeline.__init__", "pipeline.errors", "pipeline.files", "pipeline.console"],
     ["pipeline.records"],
-    ["pipeline.table", "pipeline.interfaces", "pipeline.config"],
-    ["pipeline.tables", "pipeline.prompts", "pipeline.benchmark", "pipeline.video", "pipeline.parsing"],
-    ["pipeline.chunks", "pipeline.execute", "pipeline.weights", "pipeline.graphs", "pipeline.vector_cache"],
-    ["pipeline.bert", "pipeline.classifier"],
-    ["pipeline.minilm", "pipeline.embedded_vision", "pipeline.embedded_language"],
-    ["pipeline.models", "pipeline.stages", "pipeline.verify"],
+    ["pipeline.table", "pipeline.interfaces", "pipeline.config", "pipeline.scores", "pipeline.places"],
+    ["pipeline.tables", "pipeline.prompts", "pipeline.benchmark", "pipeline.video", "pipeline.structured"],
+    ["pipeline.parsing", "pipeline.chunks", "pipeline.execute", "pipeline.usage", "pipeline.recording"],
+    ["pipeline.weights", "pipeline.graphs", "pipeline.vector_cache", "pipeline.clip_preprocess"],
+    ["pipeline.replies", "pipeline.metering", "pipeline.recording_zip", "pipeline.local_llm"],
+    ["pipeline.bert", "pipeline.classifier", "pipeline.clip_networks", "pipeline.endpoint"],
+    ["pipeline.minilm", "pipeline.clip", "pipeline.embedded_vision", "pipeline.embedded_language"],
+    ["pipeline.models", "pipeline.stages", "pipeline.verify", "pipeline.desk"],
+    ["pipeline.agents"],
+    ["pipeline.team"],
     ["pipeline.run"],
     ["pipeline.cli"],
     ["sitegen.__init__", "sitegen.words", "sitegen.numerals", "sitegen.blocks"],
     ["sitegen.checks", "sitegen.score", "sitegen.ledger", "sitegen.output", "sitegen.contexts"],
+    ["sitegen.figure2"],
     ["sitegen.about", "sitegen.evaluate", "sitegen.gathered", "sitegen.formats", "sitegen.video_contexts"],
-    ["sitegen.sheets", "sitegen.media", "sitegen.transcript", "sitegen.verdicts", "sitegen.leaderboard"],
+    ["sitegen.thumbnails"],
+    [
+        "sitegen.sheets",
+        "sitegen.media",
+        "sitegen.transcript",
+        "sitegen.verdicts",
+        "sitegen.leaderboard",
+    ],
     ["sitegen.readers", "sitegen.charts", "sitegen.serve"],
     ["sitegen.submissions"],
     ["sitegen.page_board", "sitegen.page_video", "sitegen.page_submission", "sitegen.page_method"],
@@ -84,3 +96,9 @@ def test_help_loads_nothing_heavy() -> None:
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert run.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("name", ["stages", "run", "verify"])
+def test_the_flow_does_not_know_who_answers(name: str) -> None:
+    parts = ("agents", "embedded_vision", "embedded_language", "classifier", "clip", "minilm", "endpoint")
+    assert not _imports(ROOT / "pipeline" / f"{name}.py") & {f"pipeline.{part}" for part in parts}

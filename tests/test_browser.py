@@ -14,6 +14,8 @@ from sitegen.serve import serving
 from tests.browser_setup import ARGUMENTS, find_chromium
 from tests.site_fixtures import make_benchmark, make_board
 
+pytestmark = pytest.mark.browser
+
 BUDGET = 300 * 1024
 PATHS = (
     "index.html",

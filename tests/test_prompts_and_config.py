@@ -81,3 +81,27 @@ def test_benchmark_is_found_here_above_and_in_demo(tmp_path: Path) -> None:
     (tmp_path / "demo" / "coooler.toml").write_text('name = "Mine"\n')
     for start in (tmp_path, tmp_path / "demo", tmp_path / "demo" / "deep"):
         assert find_benchmark(start).truth == tmp_path.resolve() / "demo" / "truth.csv"
+
+
+def test_a_role_keeps_the_papers_settings_where_it_says_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text('[roles]\nvideo = { model = "ViLA" }\nrhs = { model = "x", temperature = 0.1 }\n')
+    roles = read_run_config(path).roles
+    assert (roles.video.model, roles.video.temperature, roles.video.max_tokens) == ("ViLA", 0.2, 512)
+    assert (roles.rhs.temperature, roles.rhs.max_tokens) == (0.1, 200)
+    assert (roles.aes.temperature, roles.aes.max_tokens) == (0.2, 100)
+
+
+def test_the_settings_in_the_readme_are_settings(tmp_path: Path) -> None:
+    text = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    blocks = [block.split("```", 1)[0] for block in text.split("```toml\n")[1:]]
+    assert blocks
+    for block in blocks:
+        (tmp_path / "run.toml").write_text(block, encoding="utf-8")
+        assert read_run_config(tmp_path / "run.toml").models["aos"] == "gpt-4o-mini"
+
+
+def test_clip_without_a_folder_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "run.toml").write_text('matcher = "clip"\n')
+    with pytest.raises(ConfigError, match="clip_folder"):
+        read_run_config(tmp_path / "run.toml")

@@ -9,6 +9,7 @@ import pytest
 from pipeline.config import FrameSettings, RunConfig, Track2Settings
 from pipeline.errors import FaultsError, InputError
 from pipeline.execute import ProcessExecutor, SerialExecutor
+from pipeline.places import Place
 from pipeline.records import Box, Kind, Stage, TrackBox
 from pipeline.run import RUN_TABLES, RunReport, VideoRun, find_videos, predict
 from pipeline.table import metadata
@@ -36,7 +37,11 @@ def _boxes() -> list[TrackBox]:
 
 def _predict(folder: Path, out: Path, config: RunConfig = QUICK, workers: int = 1) -> RunReport:
     executor = ProcessExecutor(workers) if workers > 1 else SerialExecutor()
-    return predict(find_videos(folder), _boxes(), config, out, executor)
+    return predict(_found(folder), _boxes(), config, Place(str(out)), executor)
+
+
+def _found(folder: Path) -> list[Place]:
+    return find_videos(Place(str(folder)))
 
 
 def _bytes(out: Path) -> dict[str, bytes]:
@@ -88,11 +93,11 @@ def test_other_settings_boxes_or_clips_are_run_again(clips: Path, tmp_path: Path
     _predict(clips, out)
     assert _predict(clips, out, QUICK.model_copy(update={"seed": 1})).reused == 0
     _predict(clips, out)
-    paths = find_videos(clips)
-    moved = [*_boxes(), TrackBox(paths[0].stem, 0, "new", Kind.TRAFFIC, Box(0, 0, 50, 50))]
-    assert predict(paths, moved, QUICK, out, SerialExecutor()).reused == 1
-    write_clip(paths[1], 30, (640, 360))
-    assert predict(paths, moved, QUICK, out, SerialExecutor()).reused == 1
+    first, second = _found(clips)
+    moved = [*_boxes(), TrackBox(Path(first.name).stem, 0, "new", Kind.TRAFFIC, Box(0, 0, 50, 50))]
+    assert predict([first, second], moved, QUICK, Place(str(out)), SerialExecutor()).reused == 1
+    write_clip(clips / second.name, 30, (640, 360))
+    assert predict([first, second], moved, QUICK, Place(str(out)), SerialExecutor()).reused == 1
 
 
 def test_same_bytes_in_one_process_and_in_two(clips: Path, tmp_path: Path) -> None:
@@ -132,20 +137,53 @@ def test_all_stages_are_recorded_and_the_clips_differ(clips: Path, tmp_path: Pat
 
 def test_progress_is_told_of_each_video(clips: Path, tmp_path: Path) -> None:
     seen: list[VideoRun] = []
-    predict(find_videos(clips), _boxes(), QUICK, tmp_path / "run", SerialExecutor(), seen.append)
-    assert [run.video_id for run in seen] == [path.stem for path in find_videos(clips)]
+    predict(_found(clips), _boxes(), QUICK, Place(str(tmp_path / "run")), SerialExecutor(), done=seen.append)
+    assert [run.video_id for run in seen] == [Path(clip.name).stem for clip in _found(clips)]
+
+
+def test_one_video_alone_keeps_what_is_there_of_the_others(clips: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    (clips / "broken.mp4").write_bytes(b"no video")
+    whole = _predict(clips, out)
+    shutil.copy(clips / whole.outcomes[1].file, clips / "broken.mp4")
+    seen: list[VideoRun] = []
+    found = _found(clips)
+    predict(found, _boxes(), QUICK, Place(str(out)), SerialExecutor(), only=["broken"], done=seen.append)
+    assert {run.video_id: run.reused for run in seen} == {
+        "broken": False,
+        "demo_0001": True,
+        "demo_0002": True,
+    }
+    assert not any(outcome.error for outcome in OUTCOMES.read(out / "outcomes.parquet"))
+    with pytest.raises(InputError, match="nobody"):
+        predict(found, _boxes(), QUICK, Place(str(out)), SerialExecutor(), only=["nobody"])
+
+
+def test_clips_and_run_folder_behind_a_url(clips: Path, tmp_path: Path) -> None:
+    import fsspec
+
+    memory = fsspec.filesystem("memory")
+    for path in sorted(clips.iterdir()):
+        memory.pipe_file(f"/far/clips/{path.name}", path.read_bytes())
+    far, out = Place("memory://far/clips"), Place("memory://far/run")
+    first = predict(find_videos(far), _boxes(), QUICK, out, SerialExecutor())
+    assert (first.reused, len(first.failed)) == (0, 0)
+    assert predict(find_videos(far), _boxes(), QUICK, out, SerialExecutor()).reused == 2
+    _predict(clips, tmp_path / "near")
+    near = _bytes(tmp_path / "near")
+    assert {name: (out / f"{name}.parquet").read() for name in near} == near
 
 
 def test_names_that_are_no_ids_are_all_listed(tmp_path: Path) -> None:
     for name in ("good.mp4", "two words.mp4", "ünïcode.mp4", "good.mkv", "notes.txt"):
         (tmp_path / name).write_bytes(b"x")
     with pytest.raises(FaultsError) as caught:
-        find_videos(tmp_path)
+        _found(tmp_path)
     assert len(caught.value.faults) == 3
 
 
 def test_no_folder_and_no_videos(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such folder"):
-        find_videos(tmp_path / "nowhere")
+        _found(tmp_path / "nowhere")
     with pytest.raises(InputError, match="found no video file"):
-        find_videos(tmp_path)
+        _found(tmp_path)

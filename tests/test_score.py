@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.records import Signature, VideoScore
+from pipeline.scores import Signature, VideoScore
 from sitegen.score import (
     TOLERANCE,
     pair_cosines,

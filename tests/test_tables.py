@@ -17,7 +17,6 @@ from pipeline.records import (
     Item,
     Kind,
     Match,
-    PairScore,
     Parse,
     Prediction,
     Reply,
@@ -26,9 +25,10 @@ from pipeline.records import (
     StageOutput,
     TrackBox,
     TruthHazard,
+    UsageRow,
     VideoOutcome,
-    VideoScore,
 )
+from pipeline.scores import PairScore, VideoScore
 from pipeline.table import SCHEMA_VERSION, Table, metadata
 from pipeline.tables import PREDICTIONS, TABLES
 
@@ -65,6 +65,10 @@ RECORDS: dict[str, list[Any]] = {
     "outcomes": [
         VideoOutcome("v2", "v2.mp4", 0, 0.0, 0, 0, "broken"),
         VideoOutcome("v1", "v1.mp4", 300, 29.97, 1280, 720, "", "odd"),
+    ],
+    "usage": [
+        UsageRow("v1", "scene", "gpt", 25, 1_000, 20, 12.5, 0.001),
+        UsageRow("v1", "aes", "", 1, None, None, None, None),
     ],
     "pairs": [PairScore("v2", 1, "h1", -0.25, 0.0), PairScore("v1", 2, "h1", 0.5, 0.5)],
     "videos": [
