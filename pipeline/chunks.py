@@ -1,6 +1,6 @@
 """Noun chunks with spaCy (paper: Track 2, en_core_web_sm)."""
 
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,7 @@ def language() -> "Language":
     )
 
 
+@lru_cache(maxsize=4096)  # agents say the same again and again, and parsing takes milliseconds
 def noun_chunks(text: str) -> tuple[str, ...]:
     """The noun chunks of a text, in order, articles kept as spaCy gives them."""
     return tuple(chunk.text.strip() for chunk in language()(text).noun_chunks if chunk.text.strip())

@@ -6,7 +6,6 @@
 Every step gives `StageOutput`s; an answer without items makes an empty stage, never a crash.
 """
 
-import hashlib
 import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.chunks import noun_chunks, without_article
 from pipeline.config import RunConfig
+from pipeline.files import sha256_of
 from pipeline.interfaces import LanguageAgent, Prompt, VisionAgent
 from pipeline.parsing import parse
 from pipeline.prompts import fill
@@ -41,12 +41,15 @@ def run_stages(
     Raises AgentError when an agent does not answer.
     """
 
+    # Hashed once: Track 2 shows all of them again with every question.
+    pixels = [_pixels_sha256(frame) for frame in frames]
+
     def scene(call: int) -> StageOutput:
-        frame = frames[call]
-        return _look(agents.scene, "T1-VLM", Stage.SCENE, call, video_id, [frame], frame.index)
+        frame, pixel = frames[call], pixels[call]
+        return _look(agents.scene, "T1-VLM", Stage.SCENE, call, video_id, [frame], [pixel], frame.index)
 
     def answer(call: int) -> StageOutput:
-        return _look(agents.video, "T2-VLM", Stage.ANSWER, call, video_id, frames, None)
+        return _look(agents.video, "T2-VLM", Stage.ANSWER, call, video_id, frames, pixels, None)
 
     language = agents.language
     scenes = _all(scene, len(frames), agents.in_flight)
@@ -80,16 +83,14 @@ def entries(items: Sequence[Item]) -> list[str]:
     return [": ".join(filter(None, (item.label, item.description))) for item in items]
 
 
-def request_sha256(agent: str, prompt: Prompt, frames: Sequence[Frame], call: int) -> str:
-    """Hash of all that a request depends on: agent, prompt, pixels, and the number of the call."""
-    digest = hashlib.sha256()
-    digest.update(
-        json.dumps([agent, prompt.prompt_id, prompt.system, prompt.user, prompt.format_hint, call]).encode()
-    )
-    for frame in frames:
-        digest.update(f"{frame.index}:{frame.rgb.shape}".encode())
-        digest.update(frame.rgb.tobytes())
-    return digest.hexdigest()
+def request_sha256(agent: str, prompt: Prompt, pixels: Sequence[str], call: int) -> str:
+    """Hash of all that a request depends on: agent, prompt, the frames' hashes, the number of the call."""
+    parts = [agent, prompt.prompt_id, prompt.system, prompt.user, prompt.format_hint, call, *pixels]
+    return sha256_of(json.dumps(parts).encode())
+
+
+def _pixels_sha256(frame: Frame) -> str:
+    return sha256_of(f"{frame.index}:{frame.rgb.shape}:".encode() + frame.rgb.tobytes())
 
 
 def _look(
@@ -99,12 +100,13 @@ def _look(
     call: int,
     video_id: str,
     frames: Sequence[Frame],
+    pixels: Sequence[str],
     frame_index: int | None,
 ) -> StageOutput:
     prompt = fill(prompt_id)
     reply = agent.look(frames, prompt, call)
     items, how = parse(reply.text)
-    key = request_sha256(agent.name, prompt, frames, call)
+    key = request_sha256(agent.name, prompt, pixels, call)
     return StageOutput(video_id, stage, call, prompt_id, key, reply, items, how, frame_index)
 
 
