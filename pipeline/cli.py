@@ -102,6 +102,7 @@ def predict(
                 "config_sha256": settings.sha256,
                 "videos": len(report.outcomes),
                 "reused": report.reused,
+                "not_run": report.not_run,
                 "predictions": predictions,
                 "snippets": len(report.tables["snippets"]),
                 "snippets_excluded": excluded,
@@ -112,13 +113,15 @@ def predict(
         )
     else:
         lines = [
-            f"{len(report.outcomes)} videos ({report.reused} from before, {len(report.failed)} failed), "
+            f"{len(report.outcomes)} videos ({report.reused} from before, {len(report.failed)} failed"
+            f"{f', {report.not_run} not run' if report.not_run else ''}), "
             f"{predictions} predictions -> {Place(out) / 'predictions.parquet'}",
             snippets_line(report),
         ]
         spent = spent_line(report.tables["usage"], settings.currency)
         console.stdout().print("\n".join([*lines, *([spent] if spent else [])]), markup=False, soft_wrap=True)
-    if report.failed and (strict or len(report.failed) == len(report.outcomes)):
+    ran = len(report.outcomes) - report.not_run
+    if report.failed and (strict or len(report.failed) == ran):
         raise typer.Exit(1)
 
 
@@ -200,7 +203,7 @@ def run_with_progress(
     only: "Sequence[str]" = (),
 ) -> "RunReport":
     """`pipeline.run.predict` with a progress bar and what was spent, and each odd video said."""
-    from pipeline.run import VideoRun
+    from pipeline.run import NOT_RUN, VideoRun
     from pipeline.run import predict as run_all
     from pipeline.team import Services
 
@@ -213,7 +216,7 @@ def run_with_progress(
             line = spent_line(spent, settings.currency)
             bar.update(task, advance=1, description=f"{settings.name} ({line})" if line else settings.name)
             outcome = run.outcome
-            if outcome.error:
+            if outcome.error and outcome.error != NOT_RUN:
                 bar.console.print(f"failed: {outcome.video_id}: {outcome.error}", markup=False)
             elif outcome.note:
                 bar.console.print(f"note: {outcome.file}: {outcome.note}", markup=False)

@@ -34,6 +34,8 @@ from pipeline.video import read_keyframes
 VIDEO_SUFFIXES = frozenset({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".ts"})
 SAFE_ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,127}")
 
+NOT_RUN = "not run yet"
+
 # The outcome comes last: it vouches for the rest of a part.
 RUN_TABLES: tuple[Table[Any], ...] = (STAGES, SNIPPETS, MATCHES, PREDICTIONS, USAGE, OUTCOMES)
 
@@ -199,7 +201,12 @@ class RunReport:
     @property
     def failed(self) -> tuple[VideoOutcome, ...]:
         """The videos with an error."""
-        return tuple(outcome for outcome in self.outcomes if outcome.error)
+        return tuple(outcome for outcome in self.outcomes if outcome.error not in ("", NOT_RUN))
+
+    @property
+    def not_run(self) -> int:
+        """How many videos `only` left out that no earlier run had finished."""
+        return sum(outcome.error == NOT_RUN for outcome in self.outcomes)
 
 
 def predict(
@@ -260,7 +267,7 @@ def _runs(jobs: Sequence[Job], parts: Place, executor: Executor, only: Collectio
         if tables is not None:
             yield VideoRun(job.video_id, True, tables)
         elif only and job.video_id not in only:
-            yield lost_video(job, "not run yet")
+            yield lost_video(job, NOT_RUN)
         else:
             todo.append(job)
     for run in executor.run(run_video, todo, lost_video):
