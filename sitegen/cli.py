@@ -117,6 +117,9 @@ def _print_board(evaluations: "list[Evaluation]") -> None:
 
     from sitegen.leaderboard import rank
 
+    if not evaluations:
+        console.stdout().print("no submissions yet: coooler submit FILE --name NAME", markup=False)
+        return
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("rank", "submission", "BESM", "SAM", "detection", "hazard recall", "videos"):
         left = heading == "submission"
@@ -135,8 +138,7 @@ def _print_board(evaluations: "list[Evaluation]") -> None:
         )
     output = console.stdout()
     output.print(table)
-    if evaluations:
-        output.print(f"signature {evaluations[0].card.signature}", markup=False, soft_wrap=True)
+    output.print(f"signature {evaluations[0].card.signature}", markup=False, soft_wrap=True)
 
 
 @app.command()

@@ -155,6 +155,13 @@ def test_submit_twice_withdraw_and_list(folder: Path) -> None:
     assert [json.loads(line)["event"] for line in ledger] == ["add", "replace", "withdraw"]
 
 
+def test_a_board_without_submissions_is_built_and_says_so(folder: Path) -> None:
+    run = coooler(folder, "build")
+    assert run.returncode == 0, run.stderr
+    assert "no submissions yet" in run.stdout
+    assert (folder / "site" / "index.html").is_file()
+
+
 def test_usage_is_exit_2_and_no_benchmark_is_exit_1(tmp_path: Path) -> None:
     assert coooler(tmp_path, "score").returncode == 2
     assert coooler(tmp_path, "nonsense").returncode == 2
