@@ -33,6 +33,7 @@ class Fault:
 
     `row` is the 1-based number of the data row (a CSV's header is not counted),
     None when the fault is of the whole file; `column` is None when it is of the whole row.
+    `line` is the 1-based line of a text file, where that is known.
     """
 
     file: str
@@ -41,6 +42,7 @@ class Fault:
     found: str
     expected: str
     mend: str
+    line: int | None = None
 
     def __str__(self) -> str:
         """One line: place, found, expected, mend."""
@@ -52,8 +54,8 @@ class Fault:
         return f"{place}: found {self.found}; expected {self.expected}. {self.mend}"
 
     def as_dict(self) -> dict[str, str | int | None]:
-        """The fields by name, for JSON."""
-        return asdict(self)
+        """The fields that are said, by name, for JSON; `line` serves annotations only."""
+        return {name: value for name, value in asdict(self).items() if name != "line"}
 
 
 class FaultsError(InputError):

@@ -10,7 +10,8 @@ import math
 import re
 import reprlib
 import unicodedata
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import NoReturn
 
 from pipeline.errors import Fault, FaultsError
@@ -41,23 +42,35 @@ class Wrong(Exception):  # noqa: N818  (a control signal inside the readers, nev
 
 @dataclass(slots=True)
 class Faults:
-    """Collects the faults of one file: of each column 1,000 in detail, of the rest the count."""
+    """Collects the faults of one file: of each column 1,000 in detail, of the rest the count.
+
+    `line_of` gives the line of a row in a text file; it is asked only for the faults that are told.
+    """
 
     file: str
     kept: dict[str | None, list[Fault]] = field(default_factory=dict)
     more: int = 0
+    line_of: Callable[[int], int | None] | None = None
 
-    def add(self, row: int | None, column: str | None, found: str, expected: str, mend: str) -> None:
-        """One more fault; `row` is 1-based, None for the whole file."""
+    def add(
+        self,
+        row: int | None,
+        column: str | None,
+        found: str,
+        expected: str,
+        mend: str,
+        line: int | None = None,
+    ) -> None:
+        """One more fault; `row` is 1-based, None for the whole file. `line` is needed only without a row."""
         of_column = self.kept.setdefault(column, [])
         if len(of_column) < MAX_DETAILED_FAULTS:
-            of_column.append(Fault(self.file, row, column, found, expected, mend))
+            of_column.append(Fault(self.file, row, column, found, expected, mend, line))
         else:
             self.more += 1
 
-    def stop(self, found: str, expected: str, mend: str) -> NoReturn:
+    def stop(self, found: str, expected: str, mend: str, line: int | None = None) -> NoReturn:
         """A fault of the whole file, after which nothing more can be read: raise FaultsError."""
-        self.add(None, None, found, expected, mend)
+        self.add(None, None, found, expected, mend, line)
         raise self._error()
 
     def raise_if_any(self) -> None:
@@ -71,11 +84,16 @@ class Faults:
             key=lambda fault: fault.row or 0,
         )
         more = self.more + len(faults[MAX_DETAILED_FAULTS:])
-        faults = faults[:MAX_DETAILED_FAULTS]
+        faults = [self._with_line(fault) for fault in faults[:MAX_DETAILED_FAULTS]]
         if more:
             mend = "Mend the faults above and check again."
             faults.append(Fault(self.file, None, None, f"{more:,} more faults", "none", mend))
         return FaultsError(faults)
+
+    def _with_line(self, fault: Fault) -> Fault:
+        if self.line_of is None or fault.row is None or fault.line is not None:
+            return fault
+        return replace(fault, line=self.line_of(fault.row))
 
 
 def visible(text: str, limit: int = SHOWN_CHARS) -> str:
@@ -98,7 +116,8 @@ def show(value: object) -> str:
         return "nothing (null)"
     if isinstance(value, float) and math.isnan(value):
         return "NaN"
-    return f"{visible(reprlib.repr(value))} ({type(value).__name__})"
+    kind = dict if isinstance(value, dict) else type(value)
+    return f"{visible(reprlib.repr(value))} ({kind.__name__})"
 
 
 def is_missing(value: object) -> bool:
@@ -116,9 +135,10 @@ def text(value: object, expected: str = "text") -> str:
         try:
             value.encode()
         except UnicodeEncodeError as error:
-            broken = value[error.start : error.end].encode("utf-8", "surrogatepass")
-            if 0xDC80 <= ord(value[error.start]) <= 0xDCFF:  # a byte that did not decode
-                broken = value[error.start : error.end].encode("utf-8", "surrogateescape")
+            # U+DC80 to U+DCFF stand for bytes that did not decode, unless others are among them.
+            bytes_only = all("\udc80" <= char <= "\udcff" for char in value[error.start : error.end])
+            how = "surrogateescape" if bytes_only else "surrogatepass"
+            broken = value[error.start : error.end].encode("utf-8", how)
             found = f"{broken[:8]!r}, which is not UTF-8, in {show(value)}"
             raise Wrong(found, "text in UTF-8", "Save the file as UTF-8.") from None
     stripped = value.strip()

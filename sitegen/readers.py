@@ -1,40 +1,73 @@
-"""Outside files to records: truth and predictions as Parquet, CSV or JSON Lines.
+"""Outside files to records: truth and predictions as Parquet, CSV or JSON Lines, packed or not.
 
 A file is read whole or refused with every fault in it. The columns and their meaning are those of
-`TruthHazard` and `Prediction`, the same in each format.
+`TruthHazard` and `Prediction`, the same in each format. Predictions may also come as other benchmarks
+write them (coool.py, outside.py).
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from difflib import get_close_matches
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from pipeline.records import Prediction, TruthHazard
 from sitegen import checks
+from sitegen.captions import Captions, checked, some
 from sitegen.checks import Faults, Wrong, is_missing, visible
-from sitegen.sheets import Sheet, load
+from sitegen.coool import coool, twocoool
+from sitegen.formats import NAMES, TABLES, ending_of, format_of, prediction_format_of, refuse_other_kind
+from sitegen.outside import coco, scripts
+from sitegen.sheets import Sheet, sheet_of
+from sitegen.texts import limit_rows
+from sitegen.unpack import Content, content_of
+from sitegen.video_ids import VideoIds, read_video_map
 
+__all__ = [
+    "FORMATS",
+    "PREDICTION_COLUMNS",
+    "ReadOptions",
+    "ReadPredictions",
+    "choose_format",
+    "read_predictions",
+    "read_truth",
+    "read_video_map",
+]
+
+FORMATS = tuple(NAMES)
 PREDICTION_COLUMNS = ("video_id", "rank", "description", "label", "track_ids", "frame_indices")
 TRUTH_COLUMNS = ("video_id", "hazard_id", "label", "description", "track_id", "first_frame", "last_frame")
 
 _PREDICTION_REQUIRED = PREDICTION_COLUMNS[:3]
 _TRUTH_REQUIRED = TRUTH_COLUMNS[:4]
-_SHOWN_IDS = 20
-_SUGGESTIONS = 20
+_SHOWN_COLUMNS = 20
 _SHA256 = re.compile(r"[0-9a-f]{64}")
-_UNSEEN: Any = object()
+_TEXTS = {str, type(None)}
+_NUMBERS = {int, type(None)}
 _BAD: Any = object()  # a cell whose fault is already noted
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """How a predictions file is read; by default its content says so.
+
+    `source_format` is one of `FORMATS`, `caption_column` names the column of a 2COOOL file that holds
+    the caption, `video_map` maps a video id of the file to the truth's.
+    """
+
+    source_format: str = ""
+    caption_column: str = ""
+    video_map: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class ReadPredictions:
     """What a predictions file holds, sorted by video and rank.
 
-    `source_format` is `csv`, `jsonl` or `parquet`; `sha256` is of the file's bytes;
-    `config_sha256` is the run configuration that the pipeline noted in its Parquet, else empty.
+    `source_format` is one of `FORMATS`; `sha256` is of the file's bytes, as it came; `config_sha256` is
+    the run configuration that the pipeline noted in its Parquet, else empty; `ending` is what the
+    file's name should end in (`csv`, `csv.gz`, `json`), told by its content.
     """
 
     predictions: tuple[Prediction, ...]
@@ -42,21 +75,92 @@ class ReadPredictions:
     sha256: str
     warnings: tuple[str, ...]
     config_sha256: str = ""
+    ending: str = ""
 
 
-def read_predictions(path: Path, truth: Iterable[TruthHazard] | None = None) -> ReadPredictions:
+def read_predictions(
+    path: Path, truth: Iterable[TruthHazard] | None = None, options: ReadOptions | None = None
+) -> ReadPredictions:
     """The predictions in a file; with `truth`, their videos must be among its videos.
 
     A file with a header but no rows is accepted with a warning: it predicts nothing. Hazard videos
     of the truth that have no prediction are a warning. Raises FaultsError with every fault.
     """
+    options = options or ReadOptions()
     faults = Faults(visible(str(path), 1_000))
-    sheet, source_format, sha256 = load(path, PREDICTION_COLUMNS, faults)
-    _missing_columns(sheet, _PREDICTION_REQUIRED, faults)
+    content = content_of(path, faults)
+    source_format = choose_format(content, options, faults)
     hazards = None if truth is None else list(truth)
     known = None if hazards is None else {hazard.video_id for hazard in hazards}
+    if source_format in TABLES:
+        sheet = sheet_of(content.data, source_format, PREDICTION_COLUMNS, faults)
+        ids = VideoIds(known, options.video_map, sheet.cells.get("video_id", ()))
+        predictions = _of_sheet(sheet, ids, faults)
+        warnings = _unknown_columns(sheet, PREDICTION_COLUMNS)
+        config = sheet.metadata.get("config_sha256", "")
+    else:
+        captions = _captions(content.data, source_format, options, faults)
+        ids = VideoIds(known, options.video_map, captions.rows)
+        predictions = _of_captions(captions, ids, faults)
+        warnings = captions.warnings
+        config = ""
+    predictions.sort(key=attrgetter("video_id", "rank"))
+    warnings += ids.warnings()
+    if not predictions:
+        warnings.append("The file holds no prediction.")
+    warnings += _missing_videos(predictions, hazards or ())
+    ending = ending_of(source_format)
+    return ReadPredictions(
+        tuple(predictions),
+        source_format,
+        content.sha256,
+        tuple(warnings),
+        config if _SHA256.fullmatch(config) else "",
+        f"{ending}.{content.packing}" if content.packing else ending,
+    )
 
-    videos = _column(sheet, "video_id", _video_check(known), faults)
+
+def choose_format(content: Content, options: ReadOptions, faults: Faults) -> str:
+    """The format that was asked for, else the one that the content looks like.
+
+    Raises FaultsError when the content is no predictions file, or not of the format that was asked for.
+    """
+    asked = options.source_format
+    if not asked:
+        found = prediction_format_of(content.data, content.name, faults, options.caption_column)
+    elif asked in NAMES:
+        refuse_other_kind(content.data, asked, faults)
+        found = asked
+    else:
+        faults.stop(f"no format '{visible(asked)}'", f"one of {', '.join(NAMES)}", "Ask for one of these.")
+    if options.caption_column and found != "2coool":
+        mend = "Leave the caption column out, or ask for the format 2coool."
+        faults.stop(f"{NAMES[found]}, and a caption column chosen", "2COOOL results", mend)
+    return found
+
+
+def _captions(data: bytes, source_format: str, options: ReadOptions, faults: Faults) -> Captions:
+    if source_format == "2coool":
+        return twocoool(data, options.caption_column, faults)
+    read = {"coool": coool, "scripts": scripts, "coco": coco}
+    return read[source_format](data, faults)
+
+
+def _of_captions(captions: Captions, ids: VideoIds, faults: Faults) -> list[Prediction]:
+    """The predictions of an outside format, with the truth's video ids."""
+    limit_rows(len(captions.predictions), faults)
+    videos = {raw: checked(ids, raw, faults, row, captions.column) for raw, row in captions.rows.items()}
+    faults.raise_if_any()
+    return [
+        row if videos[row.video_id] == row.video_id else replace(row, video_id=videos[row.video_id] or "")
+        for row in captions.predictions
+    ]
+
+
+def _of_sheet(sheet: Sheet, ids: VideoIds, faults: Faults) -> list[Prediction]:
+    """The predictions of a file with our columns."""
+    _missing_columns(sheet, _PREDICTION_REQUIRED, faults)
+    videos = _column(sheet, "video_id", ids, faults)
     ranks = _column(sheet, "rank", lambda value: checks.whole(value, 1), faults)
     descriptions = _column(sheet, "description", checks.description, faults)
     labels = _column(sheet, "label", checks.text, faults, None)
@@ -64,16 +168,8 @@ def read_predictions(path: Path, truth: Iterable[TruthHazard] | None = None) -> 
     frames = _column(sheet, "frame_indices", checks.frame_indices, faults, ())
     _unique(sheet, videos, ranks, "rank", faults)
     faults.raise_if_any()
-
     rows = zip(videos, ranks, descriptions, labels, tracks, frames, strict=True)
-    predictions = sorted((Prediction(*row) for row in rows), key=attrgetter("video_id", "rank"))
-    warnings = _unknown_columns(sheet, PREDICTION_COLUMNS)
-    if not predictions:
-        warnings.append("The file holds no prediction.")
-    warnings += _missing_videos(predictions, hazards or ())
-    config = sheet.metadata.get("config_sha256", "")
-    config = config if _SHA256.fullmatch(config) else ""
-    return ReadPredictions(tuple(predictions), source_format, sha256, tuple(warnings), config)
+    return [Prediction(*row) for row in rows]
 
 
 def read_truth(path: Path) -> list[TruthHazard]:
@@ -83,7 +179,9 @@ def read_truth(path: Path) -> list[TruthHazard]:
     only row; its `hazard_id` may be empty. Raises FaultsError with every fault.
     """
     faults = Faults(visible(str(path), 1_000))
-    sheet, _, _ = load(path, TRUTH_COLUMNS, faults)
+    content = content_of(path, faults)
+    source_format = format_of(content.data, content.name, faults)
+    sheet = sheet_of(content.data, source_format, TRUTH_COLUMNS, faults)
     _missing_columns(sheet, _TRUTH_REQUIRED, faults)
     if not sheet.rows and not faults.kept:
         faults.stop("no rows", "at least one video", "Add a row for every video of the benchmark.")
@@ -124,23 +222,28 @@ def _column(
     cells = sheet.cells.get(name)
     if cells is None:
         return [_BAD if name in faults.kept else missing] * len(sheet.rows)
-    seen: dict[type, dict[Any, Any]] = {str: {}, int: {}}
+    kinds = set(map(type, cells))
+    results: Iterator[Any] = (_result(value, check, missing) for value in cells)
+    if kinds <= _TEXTS or kinds <= _NUMBERS:
+        of_value = {value: _result(value, check, missing) for value in dict.fromkeys(cells)}
+        results = map(of_value.__getitem__, cells)
+        if Wrong not in set(map(type, of_value.values())):
+            return list(results)
     clean: list[Any] = []
-    for row, value in zip(sheet.rows, cells, strict=True):
-        results = seen.get(type(value))
-        result = _UNSEEN if results is None else results.get(value, _UNSEEN)
-        if result is _UNSEEN:
-            try:
-                result = missing if missing is not _BAD and is_missing(value) else check(value)
-            except Wrong as wrong:
-                result = wrong.with_traceback(None)
-            if results is not None:
-                results[value] = result
-        if type(result) is Wrong:
+    for row, result in zip(sheet.rows, results, strict=True):
+        is_wrong = type(result) is Wrong
+        if is_wrong:
             faults.add(row, name, result.found, result.expected, result.mend)
-            result = _BAD
-        clean.append(result)
+        clean.append(_BAD if is_wrong else result)
     return clean
+
+
+def _result(value: Any, check: Callable[[Any], Any], missing: Any) -> Any:
+    """The clean value of a cell, or what is wrong with it."""
+    try:
+        return missing if missing is not _BAD and is_missing(value) else check(value)
+    except Wrong as wrong:
+        return wrong.with_traceback(None)
 
 
 def _missing_columns(sheet: Sheet, required: Sequence[str], faults: Faults) -> None:
@@ -150,7 +253,7 @@ def _missing_columns(sheet: Sheet, required: Sequence[str], faults: Faults) -> N
     for name in required:
         if name not in sheet.columns:
             near = spelled.get(name)
-            found = f"the columns {', '.join(visible(column) for column in sheet.columns[:_SHOWN_IDS])}"
+            found = f"the columns {', '.join(visible(column) for column in sheet.columns[:_SHOWN_COLUMNS])}"
             mend = f"Rename '{visible(near)}' to '{name}'." if near else "Add the column."
             faults.add(None, name, f"no such column, but {found}", f"a column `{name}`", mend)
 
@@ -159,33 +262,7 @@ def _unknown_columns(sheet: Sheet, known: Sequence[str]) -> list[str]:
     unknown = [visible(name) for name in sheet.columns if name not in known]
     if not unknown:
         return []
-    return [f"Ignored unknown columns: {_some(unknown)}."]
-
-
-def _some(names: Sequence[str]) -> str:
-    rest = len(names) - _SHOWN_IDS
-    return ", ".join(names[:_SHOWN_IDS]) + (f" and {rest:,} more" if rest > 0 else "")
-
-
-def _video_check(known: set[str] | None) -> Callable[[object], str]:
-    """The check of a prediction's video id; with `known` ids, it must be one of them."""
-    if known is None:
-        return checks.safe_identifier
-    suggested = 0
-
-    def check(value: object) -> str:
-        nonlocal suggested
-        clean = checks.identifier(value, "a video id")
-        if clean in known:
-            return clean
-        near: list[str] = []
-        if suggested < _SUGGESTIONS:
-            suggested += 1
-            near = get_close_matches(clean, known, 1, 0.8)
-        mend = f"Did you mean '{near[0]}'?" if near else "Correct the id, or leave the row out."
-        raise Wrong(checks.show(value), f"one of the truth's {len(known)} video ids", mend)
-
-    return check
+    return [f"Ignored unknown columns: {some(unknown)}."]
 
 
 def _unique(sheet: Sheet, videos: list[Any], numbers: list[Any], column: str, faults: Faults) -> None:
@@ -231,5 +308,5 @@ def _missing_videos(predictions: Sequence[Prediction], truth: Iterable[TruthHaza
         return []
     return [
         f"{len(missing)} of {len(with_hazard)} videos with a hazard have no prediction and count as 0: "
-        f"{_some(missing)}."
+        f"{some(missing)}."
     ]

@@ -1,24 +1,21 @@
-"""A file's bytes as a sheet of raw cells: CSV, JSON Lines or Parquet, told apart by content.
+"""A file's content as a sheet of raw cells: CSV, JSON Lines or Parquet.
 
-Bounds come before parsing: bytes, rows, and for Parquet what its pages would unpack to.
+Bounds come before parsing: rows, and for Parquet what its pages would unpack to.
 """
 
-import csv
-import io
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from itertools import islice
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.files import sha256_of
+from sitegen import texts
 from sitegen.checks import Faults, visible
-from sitegen.formats import MAX_BYTES, bounded_bytes, format_of
+from sitegen.texts import RepeatedKeys, csv_rows, json_record, limit_rows
 
-MAX_ROWS = 2_000_000
 MAX_UNPACKED_BYTES = 4 * 2**30
 MAX_LIST_BYTES = 2**30
 
@@ -38,44 +35,26 @@ class Sheet:
     metadata: dict[str, str] = field(default_factory=dict)
 
 
-def load(path: Path, known: Sequence[str], faults: Faults) -> tuple[Sheet, str, str]:
-    """The sheet of a file, its format and its SHA-256; cells that cannot be read go to `faults`.
+def sheet_of(data: bytes, source_format: str, known: Sequence[str], faults: Faults) -> Sheet:
+    """The sheet of a file's content in one of our formats; cells that cannot be read go to `faults`.
 
-    Raises FaultsError at once when the file as a whole cannot be read.
+    Raises FaultsError at once when the content as a whole cannot be read.
     """
-    data = bounded_bytes(path, faults)
-    source_format = format_of(data, path, faults)
     parse: dict[str, Callable[[bytes, Sequence[str], Faults], Sheet]] = {
         "csv": _csv,
         "jsonl": _jsonl,
         "parquet": _parquet,
     }
-    return parse[source_format](data, known, faults), source_format, sha256_of(data)
+    return parse[source_format](data, known, faults)
 
 
 def _csv(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
-    # Bytes that are not UTF-8 pass as surrogates here and become faults of their own cells.
-    source = io.StringIO(data.decode("utf-8-sig", "surrogateescape"), newline="")
-    before = csv.field_size_limit(MAX_BYTES)
     header: list[str] = []
     lines: list[list[str]] = []
-    try:
-        reader = csv.reader(source, strict=True)
-        for line in reader:
-            if not line:
-                continue
-            if not header:
-                header = [name.strip() for name in line]
-            elif len(lines) == MAX_ROWS:
-                _too_many_rows(faults)
-            else:
-                lines.append(line)
-    except csv.Error as error:
-        expected = 'cells between commas, quoted with " where they hold commas, quotes or line ends'
-        mend = f"Line {reader.line_num}: close the quote, or double quotes inside quotes."
-        faults.add(len(lines) + 1 if header else None, None, str(error), expected, mend)
-    finally:
-        csv.field_size_limit(before)
+    with csv_rows(data, faults) as records:
+        header += [name.strip() for name in next(records, [])]
+        lines.extend(islice(records, texts.MAX_ROWS + 1))  # keeps what came before a broken line
+    limit_rows(len(lines), faults)
     _header_hints(header, known, faults)
     rows = []
     kept = []
@@ -102,22 +81,18 @@ def _header_hints(header: Sequence[str], known: Sequence[str], faults: Faults) -
                 faults.stop(f"{word} between the cells", "commas", mend)
 
 
-def _too_many_rows(faults: Faults) -> None:
-    faults.stop(f"more than {MAX_ROWS:,} rows", f"at most {MAX_ROWS:,}", "Leave out some predictions.")
-
-
 def _jsonl(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
     rows: list[int] = []
     records: list[dict[str, Any]] = []
     names: dict[str, None] = {}
     expected = "one JSON object a line"
+    faults.line_of = int  # a row's number is its line's
     for number, line in enumerate(data.removeprefix(b"\xef\xbb\xbf").split(b"\n"), start=1):
         if not line.strip():
             continue
-        if len(records) == MAX_ROWS:
-            _too_many_rows(faults)
+        limit_rows(len(records) + 1, faults)
         try:
-            record = json.loads(line.decode("utf-8"))
+            record = json_record(line.decode("utf-8"))
         except UnicodeDecodeError as error:
             found = f"byte {line[error.start]:#04x} at position {error.start + 1}, which is not UTF-8"
             faults.add(number, None, found, "text in UTF-8", "Save the file as UTF-8.")
@@ -128,7 +103,9 @@ def _jsonl(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
             found = f"JSON that cannot be read ({visible(str(error))})"
             faults.add(number, None, found, expected, "Mend the line.")
         else:
-            if isinstance(record, dict):
+            if isinstance(record, RepeatedKeys):
+                faults.add(number, None, record.words, "each key once", "Remove one of the two.")
+            elif isinstance(record, dict):
                 rows.append(number)
                 records.append(record)
                 names.update(dict.fromkeys(record))
@@ -145,8 +122,8 @@ def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
         leaves = [leaf for leaf in leaves if leaf.path.split(".")[0] in known]
         _parquet_bounds(metadata, faults)
         # Texts stay dictionaries, so that a small file does not unpack to a huge one.
-        texts = [leaf.path for leaf in leaves if leaf.physical_type == "BYTE_ARRAY"]
-        with pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts) as file:
+        strings = [leaf.path for leaf in leaves if leaf.physical_type == "BYTE_ARRAY"]
+        with pq.ParquetFile(pa.BufferReader(data), read_dictionary=strings) as file:
             names = file.schema_arrow.names
             marks = {_text(key): _text(value) for key, value in (file.schema_arrow.metadata or {}).items()}
             for name in sorted({name for name in known if names.count(name) > 1}):
@@ -154,7 +131,7 @@ def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
             lists = {leaf.path.split(".")[0] for leaf in leaves if leaf.max_repetition_level > 0}
             cells = {name: _lists(file, name, faults) for name in known if name in lists}
             table = file.read(columns=[name for name in known if name in names and name not in lists])
-        cells |= {name: _unpack(table.column(name)) for name in table.column_names}
+        cells |= {name: values_of(table.column(name)) for name in table.column_names}
         if any(len(column) != metadata.num_rows for column in cells.values()):
             raise ValueError(f"not every column has {metadata.num_rows} rows")
     except (pa.ArrowException, OSError, ValueError, IndexError, MemoryError) as error:
@@ -168,8 +145,7 @@ def _text(mark: bytes) -> str:
 
 
 def _parquet_bounds(metadata: pq.FileMetaData, faults: Faults) -> None:
-    if metadata.num_rows > MAX_ROWS:
-        _too_many_rows(faults)
+    limit_rows(metadata.num_rows, faults)
     # A row group's columns are not asked: pyarrow aborts the process where a damaged file has none.
     groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
     unpacked = sum(group.total_byte_size for group in groups)
@@ -191,7 +167,7 @@ def _lists(file: pq.ParquetFile, name: str, faults: Faults) -> list[Any]:
     return values
 
 
-def _unpack(column: pa.ChunkedArray) -> list[Any]:
+def values_of(column: pa.ChunkedArray) -> list[Any]:
     """An Arrow column as Python values; repeated texts of a dictionary are one object."""
     values: list[Any] = []
     for chunk in column.chunks:

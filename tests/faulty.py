@@ -38,3 +38,10 @@ def write(folder: Path, name: str, content: str | bytes) -> Path:
     path = folder / name
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
+
+
+def lines(read: Callable[[], object]) -> list[int | None]:
+    """The line of every fault that `read` raises."""
+    with pytest.raises(FaultsError) as caught:
+        read()
+    return [fault.line for fault in caught.value.faults]

@@ -4,7 +4,9 @@ import csv
 import io
 import json
 import tempfile
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -12,11 +14,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipeline.errors import FaultsError
 from pipeline.records import Prediction, TruthHazard
 from pipeline.tables import PREDICTIONS, TRUTH
 from sitegen import checks
-from sitegen.readers import read_predictions, read_truth
-from tests.faulty import HAZARDS, HEAD, write
+from sitegen.readers import ReadOptions, read_predictions, read_truth, read_video_map
+from tests.faulty import HAZARDS, HEAD, faults, places, write
 
 EXPECTED = (
     Prediction("v1", 1, 'A "quoted", cat\nruns', "cat", ("7", "a b"), (0, 12)),
@@ -125,6 +128,115 @@ def test_endings_that_name_no_other_format_do_not_matter(tmp_path: Path, name: s
 def test_lists_in_a_csv_cell(tmp_path: Path, cell: str, track_ids: tuple[str, ...]) -> None:
     text = f"video_id,rank,description,track_ids\nv1,1,x,{cell}\n"
     assert read_predictions(write(tmp_path, "p.csv", text)).predictions[0].track_ids == track_ids
+
+
+@pytest.mark.parametrize(("name", "ending"), [("p.csv", "csv"), ("p.jsonl", "jsonl"), ("p", "csv")])
+def test_the_ending_is_that_of_the_content(tmp_path: Path, name: str, ending: str) -> None:
+    content = CSV if ending == "csv" else json.dumps(JSONL[0])
+    assert read_predictions(write(tmp_path, name, content)).ending == ending
+
+
+def test_a_format_can_be_asked_for(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.data", CSV)
+    assert read_predictions(path, None, ReadOptions("csv")).predictions == EXPECTED
+    wrong = {
+        "parquet": "what looks like a CSV file",
+        "jsonl": "what looks like a CSV file",
+        "coool": "a header with 'video_id' among its columns",
+        "coco": "what looks like a CSV file",
+        "yaml": "no format 'yaml'",
+    }
+    for name, found in wrong.items():
+        assert faults(partial(read_predictions, path, None, ReadOptions(name))) == [(None, None, found)]
+    assert places(partial(read_predictions, path, None, ReadOptions("2coool"))) == [
+        (None, "video"),
+        (None, "Caption Before Incident"),
+    ]
+
+
+def test_a_caption_column_is_only_for_2coool(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.csv", CSV)
+    options = ReadOptions(caption_column="description")
+    assert places(lambda: read_predictions(path, None, options)) == [(None, None)]
+
+
+ROWS = "video_id,rank,description\n"
+NUMBERED = [TruthHazard(f"video_{number:04d}", "1", "x", "x") for number in (1, 2, 173)]
+
+
+def test_numbers_are_taken_as_the_ids_that_end_in_them(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.csv", ROWS + "1,1,a\n1,2,b\n173,1,c\n0002,1,d\n")
+    read = read_predictions(path, NUMBERED)
+    assert [(row.video_id, row.description) for row in read.predictions] == [
+        ("video_0001", "a"),
+        ("video_0001", "b"),
+        ("video_0002", "d"),
+        ("video_0173", "c"),
+    ]
+    assert read.warnings == ("Took video '1' as 'video_0001', and 2 more by their numbers.",)
+    alone = read_predictions(write(tmp_path, "a.csv", ROWS + "2,1,a\n"), NUMBERED)
+    assert alone.warnings[0] == "Took video '2' as 'video_0002' by its number."
+
+
+def test_numbers_are_not_guessed_at(tmp_path: Path) -> None:
+    mixed = write(tmp_path, "mixed.csv", ROWS + "1,1,a\nvideo_0002,1,b\n")
+    assert places(lambda: read_predictions(mixed, NUMBERED)) == [(1, "video_id")]
+    two = [TruthHazard("a_1", "1", "x", "x"), TruthHazard("b_01", "1", "x", "x")]
+    ambiguous = write(tmp_path, "two.csv", ROWS + "1,1,a\n")
+    with pytest.raises(FaultsError, match="2 ids end in this number, such as 'a_1' and 'b_01'"):
+        read_predictions(ambiguous, two)
+    same = write(tmp_path, "same.csv", ROWS + "1,1,a\n01,2,b\n")
+    assert places(lambda: read_predictions(same, NUMBERED)) == [(2, "video_id")]
+    unknown = write(tmp_path, "unknown.csv", ROWS + "1,1,a\n7,1,b\n-1,1,c\n")
+    assert places(lambda: read_predictions(unknown, NUMBERED)) == [(2, "video_id"), (3, "video_id")]
+    assert read_predictions(unknown).warnings == ()
+
+
+def test_a_map_renames_the_ids_of_a_file(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.csv", ROWS + " clip a ,1,a\nvideo_0002,1,b\n")
+    options = ReadOptions(video_map={"clip a": "video_0173"})
+    for truth in (NUMBERED, None):
+        read = read_predictions(path, truth, options)
+        assert [row.video_id for row in read.predictions] == ["video_0002", "video_0173"]
+    wrong = ReadOptions(video_map={"clip a": "nowhere"})
+    with pytest.raises(FaultsError, match="' clip a ', by the map 'nowhere'"):
+        read_predictions(path, NUMBERED, wrong)
+    unsafe = ReadOptions(video_map={"clip a": "../x"})
+    assert faults(lambda: read_predictions(path, None, unsafe)) == [(1, "video_id", "'../x'")]
+    merged = ReadOptions(video_map={"clip a": "video_0002"})
+    assert places(lambda: read_predictions(path, NUMBERED, merged)) == [(2, "video_id")]
+
+
+def test_a_map_in_two_formats(tmp_path: Path) -> None:
+    expected = {"a b": "video_0001", "2": "v.2"}
+    assert read_video_map(write(tmp_path, "m.csv", "file_id,video_id\na b,video_0001\n2, v.2\n")) == expected
+    swapped = "\ufeffVideo_ID, File_ID\r\nvideo_0001,a b\r\nv.2,2\r\n"
+    assert read_video_map(write(tmp_path, "s.csv", swapped)) == expected
+    assert read_video_map(write(tmp_path, "m.json", json.dumps(expected, indent=1))) == expected
+
+
+WRONG_MAPS: list[tuple[str, list[tuple[int | None, str | None]]]] = [
+    ("file_id,video_id\na,v1\na,v2\n", [(2, "file_id")]),
+    ("file_id,video_id\na,v1\nb,v1\n", [(2, "video_id")]),
+    ("file_id,video_id\n,v1\nb,\nc,../x\n", [(1, "file_id"), (2, "video_id"), (3, "video_id")]),
+    ("file_id,video_id\na,v1,x\n", [(1, None)]),
+    ("file_id,video_id\n", [(None, None)]),
+    ("a,v1\nb,v2\n", [(None, None)]),
+    ('file_id,video_id\na,"v1\n', [(1, None)]),
+    ("", [(None, None)]),
+    ('{"a": "v1", "a": "v2"}', [(2, None)]),
+    ('{"a": "v1", "b": "v1"}', [(2, None)]),
+    ('{"a": null, "b": ["v"], "": "v2"}', [(1, None), (2, None), (3, None)]),
+    ("{}", [(None, None)]),
+    ('["a"]', [(None, None)]),
+    ('{"a": ', [(None, None)]),
+    ("[" * 100_000, [(None, None)]),
+]
+
+
+@pytest.mark.parametrize(("content", "expected"), WRONG_MAPS, ids=range(len(WRONG_MAPS)))
+def test_wrong_maps(tmp_path: Path, content: str, expected: list[Any]) -> None:
+    assert places(lambda: read_video_map(write(tmp_path, "map", content))) == expected
 
 
 def test_truth_in_three_formats(tmp_path: Path) -> None:

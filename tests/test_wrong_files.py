@@ -1,9 +1,11 @@
 """Files that are damaged, hostile, or something else than a table."""
 
-import gzip
+import bz2
 import io
 import json
+import lzma
 import pickle
+import tarfile
 import tempfile
 import time
 import zipfile
@@ -19,7 +21,7 @@ from hypothesis import strategies as st
 from pipeline.errors import FaultsError
 from pipeline.records import Prediction
 from pipeline.tables import PREDICTIONS
-from sitegen import formats, sheets
+from sitegen import formats, sheets, texts
 from sitegen.checks import show, visible
 from sitegen.readers import read_predictions, read_truth
 from tests.faulty import HEAD, faults, places, write
@@ -29,6 +31,13 @@ def _zip(name: str) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr(name, HEAD)
+    return buffer.getvalue()
+
+
+def _tar() -> bytes:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w") as archive:
+        archive.addfile(tarfile.TarInfo("p.csv"))
     return buffer.getvalue()
 
 
@@ -50,9 +59,10 @@ WRONG_FILES: list[tuple[str, str | bytes, str]] = [
     ("p.csv", LINE, "what looks like a JSON Lines file"),
     ("p.json", "[" + LINE + "]", "a JSON list"),
     ("p.csv", "<html><body>404</body></html>", "an HTML or XML file"),
-    ("p.csv", gzip.compress(HEAD.encode()), "a gzip archive"),
-    ("p.csv.gz", gzip.compress(HEAD.encode()), "a gzip archive"),
-    ("p.zip", _zip("p.csv"), "a zip archive"),
+    ("p.csv.bz2", bz2.compress(HEAD.encode()), "a bzip2 archive"),
+    ("p.csv.xz", lzma.compress(HEAD.encode()), "an xz archive"),
+    ("p.7z", b"7z\xbc\xaf\x27\x1c" + bytes(50), "a 7-Zip archive"),
+    ("p.tar", _tar(), "a tar archive"),
     ("p.csv", _zip("xl/workbook.xml"), "an Excel workbook (.xlsx)"),
     ("p.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(100), "an old Excel workbook (.xls)"),
     ("p.pkl", pickle.dumps([1]), "a Python pickle"),
@@ -68,9 +78,11 @@ def test_files_that_are_something_else(tmp_path: Path, name: str, content: str |
     assert faults(lambda: read_truth(path)) == [(None, None, found)]
 
 
-def test_archives_are_to_be_unpacked(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["p.csv.bz2", "p.csv.xz", "p.7z", "p.tar"])
+def test_other_archives_are_to_be_unpacked(tmp_path: Path, name: str) -> None:
+    content = next(content for other, content, _ in WRONG_FILES if other == name)
     with pytest.raises(FaultsError, match="Unpack it first"):
-        read_predictions(write(tmp_path, "p.csv.gz", gzip.compress(b"x")))
+        read_predictions(write(tmp_path, name, content))
 
 
 def test_damaged_parquet(tmp_path: Path) -> None:
@@ -96,7 +108,7 @@ def test_bounds_on_bytes_and_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(formats, "MAX_BYTES", 5 * 2**20)
     path = write(tmp_path, "p.csv", HEAD + "x" * (5 * 2**20))
     assert places(lambda: read_predictions(path)) == [(None, None)]
-    monkeypatch.setattr(sheets, "MAX_ROWS", 2)
+    monkeypatch.setattr(texts, "MAX_ROWS", 2)
     rows = [Prediction("v1", rank, "x") for rank in (1, 2, 3)]
     PREDICTIONS.write(tmp_path / "p.parquet", rows)
     write(tmp_path, "p.csv", HEAD + "".join(f"{row.video_id},{row.rank},x\n" for row in rows))

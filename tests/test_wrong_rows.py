@@ -11,7 +11,7 @@ import pytest
 from pipeline.errors import FaultsError
 from pipeline.records import TruthHazard
 from sitegen.readers import read_predictions, read_truth
-from tests.faulty import HAZARDS, HEAD, TRUTH_HEAD, faults, places, write
+from tests.faulty import HAZARDS, HEAD, TRUTH_HEAD, faults, lines, places, write
 
 WRONG_CSV: list[tuple[str, list[tuple[int | None, str | None, str]]]] = [
     ("v9,1,x\n", [(1, "video_id", "'v9'")]),
@@ -99,6 +99,11 @@ WRONG_JSONL: list[tuple[str, list[tuple[int | None, str | None, str]]]] = [
 def test_wrong_values_in_json_lines(tmp_path: Path, line: str, expected: list[Any]) -> None:
     path = write(tmp_path, "p.jsonl", line + "\n")
     assert faults(lambda: read_predictions(path, HAZARDS)) == expected
+
+
+def test_mixed_halves_of_surrogates_are_a_fault(tmp_path: Path) -> None:
+    line = '{"video_id": "v1", "rank": 1, "description": "\\udc80\\ud800"}\n'
+    assert places(lambda: read_predictions(write(tmp_path, "p.jsonl", line))) == [(1, "description")]
 
 
 def test_deeply_nested_json(tmp_path: Path) -> None:
@@ -217,6 +222,33 @@ def test_a_near_miss_is_suggested(tmp_path: Path) -> None:
     path = write(tmp_path, "p.csv", HEAD + "video_001,1,x\n")
     with pytest.raises(FaultsError, match="Did you mean 'video_0001'"):
         read_predictions(path, [TruthHazard("video_0001", "1", "x", "x")])
+
+
+def test_keys_given_twice_in_a_json_line(tmp_path: Path) -> None:
+    good = '{"video_id": "v1", "rank": 1, "description": "x"}'
+    twice = '{"video_id": "v1", "rank": 2, "rank": 2, "description": "x"}'
+    path = write(tmp_path, "p.jsonl", f"{good}\n{twice}\n")
+    assert faults(lambda: read_predictions(path)) == [(2, None, "the key 'rank' twice in one object")]
+
+
+def test_faults_of_a_csv_name_the_line_where_their_row_starts(tmp_path: Path) -> None:
+    body = 'v1,1,"two\nlines"\n\nv1,0,"three\r\nlong\rlines"\nv9,2,x\nv2,1\n'
+    path = write(tmp_path, "p.csv", HEAD + body)
+    assert [row for row, _ in places(lambda: read_predictions(path, HAZARDS))] == [2, 3, 4]
+    assert lines(lambda: read_predictions(path, HAZARDS)) == [5, 8, 9]
+
+
+def test_a_broken_csv_names_the_line_where_the_row_starts(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.csv", HEAD + '\nv1,1,"a\nb"\nv1,2,"never\nclosed\n')
+    assert places(lambda: read_predictions(path)) == [(2, None)]
+    assert lines(lambda: read_predictions(path)) == [5]
+
+
+def test_lines_of_json_lines_are_their_rows_and_parquet_has_none(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.jsonl", '\n{"video_id": "v1", "rank": 0, "description": "x"}\n[1]\n')
+    assert lines(lambda: read_predictions(path)) == [2, 3]
+    pq.write_table(pa.table({"video_id": ["v1"], "rank": [0], "description": ["x"]}), tmp_path / "p.parquet")
+    assert lines(lambda: read_predictions(tmp_path / "p.parquet")) == [None]
 
 
 WRONG_TRUTH: list[tuple[str, list[tuple[int | None, str | None]]]] = [
