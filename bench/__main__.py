@@ -7,7 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from bench import clip, embedding, executors, http_client, keyframes, site
+from bench import bootstrap, clip, embedding, executors, http_client, keyframes, site
 from bench.timing import Measure
 from pipeline.benchmark import open_benchmark
 from pipeline.files import write_text
@@ -48,6 +48,7 @@ def main() -> None:
         (http_client.measure, ()),
         (clip.measure, ()),
         (executors.measure, (benchmark,)),
+        (bootstrap.measure, ()),
     ]
     measures: list[Measure] = []
     for function, arguments in jobs:

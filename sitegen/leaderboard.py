@@ -2,46 +2,42 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
-from pipeline.errors import InputError
 from pipeline.scores import Evaluation
-
-Key: TypeAlias = Literal["besm", "sam", "detection_rate", "hazard_recall"]
+from sitegen.uncertainty import Key, Uncertainty, board_order, require_same_signature
 
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """An evaluation with its competition rank (1, 2, 2, 4) by `value`; None ranks last."""
+    """An evaluation with its rank by `value`, and its place in the order, from 1; None comes last.
+
+    `rank` is the band's rank where the uncertainty is known: systems that cannot be told apart
+    share it. Without, it is the competition rank (1, 2, 2, 4), shared by equal values only.
+    """
 
     rank: int
     value: float | None
     evaluation: Evaluation
+    place: int
+    uncertainty: Uncertainty | None = None
 
 
-def rank(evaluations: Sequence[Evaluation], key: Key = "besm") -> list[Ranked]:
-    """The evaluations by rank, then name. A tie is an equal value at full precision (ours).
+def rank(
+    evaluations: Sequence[Evaluation],
+    key: Key = "besm",
+    uncertainty: Sequence[Uncertainty] | None = None,
+) -> list[Ranked]:
+    """The evaluations by value at full precision, best first, then by name (ours).
 
-    Raises InputError when two signatures differ: their numbers cannot be compared.
+    `uncertainty` has one for each evaluation, from `uncertainties(evaluations, key)` by the same
+    key. Raises InputError when two signatures differ: their numbers cannot be compared.
     """
-    for other in evaluations[1:]:
-        _same_signature(evaluations[0], other)
-    values = [getattr(evaluation.card, key) for evaluation in evaluations]
-    rows = [
-        Ranked(1 + sum(_above(better, value) for better in values), value, evaluation)
-        for value, evaluation in zip(values, evaluations, strict=True)
-    ]
-    return sorted(rows, key=lambda row: (row.rank, row.evaluation.submission.name))
-
-
-def _above(better: float | None, value: float | None) -> bool:
-    return better is not None and (value is None or better > value)
-
-
-def _same_signature(one: Evaluation, other: Evaluation) -> None:
-    if one.card.signature != other.card.signature:
-        raise InputError(
-            "These cannot be ranked together, since their signatures differ; score both the same way.\n"
-            f"  {one.submission.name}: {one.card.signature}\n"
-            f"  {other.submission.name}: {other.card.signature}"
-        )
+    require_same_signature(evaluations)
+    known: Sequence[Uncertainty | None] = uncertainty or [None] * len(evaluations)
+    pairs = sorted(zip(evaluations, known, strict=True), key=lambda pair: board_order(pair[0], key))
+    rows: list[Ranked] = []
+    for place, (evaluation, sure) in enumerate(pairs, start=1):
+        value: float | None = getattr(evaluation.card, key)
+        shared = rows[-1].rank if rows and rows[-1].value == value else place
+        rows.append(Ranked(sure.band if sure else shared, value, evaluation, place, sure))
+    return rows

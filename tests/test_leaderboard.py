@@ -6,7 +6,9 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.scores import Evaluation, Scorecard, Signature, Submission
-from sitegen.leaderboard import Key, rank
+from sitegen.leaderboard import rank
+from sitegen.uncertainty import Interval, Key, Uncertainty, uncertainties
+from tests import test_uncertainty
 
 SIGNATURE = Signature("1", "fake", "0" * 64, "1" * 64, 10, 0.8)
 
@@ -45,6 +47,50 @@ def test_other_keys() -> None:
 
 def test_nothing_to_rank() -> None:
     assert rank([]) == []
+    assert rank([], "besm", uncertainties([])) == []
+
+
+def test_places_count_on_through_ties() -> None:
+    rows = rank([_evaluation("b", 0.5), _evaluation("a", 0.5), _evaluation("c", 0.9)])
+    assert [(row.place, row.rank, row.uncertainty) for row in rows] == [
+        (1, 1, None),
+        (2, 2, None),
+        (3, 2, None),
+    ]
+
+
+def _sure(band: int) -> Uncertainty:
+    span = Interval(0.0, 1.0)
+    return Uncertainty(span, span, span, None, band, 1, 3, 0.5)
+
+
+def test_the_band_is_the_rank_and_goes_with_its_evaluation() -> None:
+    rows = [_evaluation("c", 0.1), _evaluation("a", 0.9), _evaluation("b", 0.8)]
+    known = [_sure(3), _sure(1), _sure(1)]
+    found = rank(rows, "besm", known)
+    assert [(row.rank, row.place, row.evaluation.submission.name) for row in found] == [
+        (1, 1, "a"),
+        (1, 2, "b"),
+        (3, 3, "c"),
+    ]
+    assert [row.uncertainty for row in found] == [known[1], known[2], known[0]]
+
+
+def test_bands_of_real_uncertainties_begin_at_their_place() -> None:
+    scores = {"low": 0.1, "high": 0.9, "middle": 0.5, "also middle": 0.5}
+    rows = [test_uncertainty.evaluation(name, [score] * 20) for name, score in scores.items()]
+    found = rank(rows, "besm", uncertainties(rows))
+    assert [(row.rank, row.place, row.evaluation.submission.name) for row in found] == [
+        (1, 1, "high"),
+        (2, 2, "also middle"),
+        (2, 3, "middle"),
+        (4, 4, "low"),
+    ]
+
+
+def test_one_uncertainty_for_each() -> None:
+    with pytest.raises(ValueError, match="zip"):
+        rank([_evaluation("a", 0.1), _evaluation("b", 0.2)], "besm", [_sure(1)])
 
 
 @pytest.mark.parametrize(

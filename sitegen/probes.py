@@ -1,0 +1,274 @@
+"""Probes against gaming: numbers beside the scores, never in them."""
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+
+import numpy as np
+
+from pipeline.records import TruthHazard
+from pipeline.scores import Submission
+from sitegen.copies import (
+    Copy,
+    NumberedCaptions,
+    nearest_copies,
+    number_captions,
+    number_forms,
+    over_runs,
+    whole_blocks,
+)
+from sitegen.evaluate import TextVectors
+from sitegen.numerals import percent, plural
+from sitegen.score import Index, Real, passes
+from sitegen.words import shorten, visible
+
+CONSTANT, WORD_BAG, SHUFFLED, STUFFING, NEAR_COPY, TRUTH_COPY = 0.5, 0.5, 0.9, 5.0, 0.8, 0.1
+"""From where on each probe is remarkable; for stuffing: above which (ours)."""
+
+_LEAST = 3  # videos or captions, from which on a share says something
+_LEAST_SHUFFLED = 5
+_LEAST_COPIES = 2
+_BAG_WORDS = 4
+_COPIED_WORDS = 4
+_COMMON_WORDS = 50
+_WORDS_A_VERB = 5
+_NAME_CHARS = 40
+
+_FUNCTION_TEXT = """a an the this that these those
+about above across after against ahead along alongside among around as at before behind below
+beneath beside between beyond by down during for from in inside into near next of off on onto out
+outside over past since through to toward towards under until up upon via with within without
+am are be been being is was were has have had do does did can could may might must shall should
+will would
+i me my we us our you your he him his she her it its they them their who whom whose which what
+someone something nothing there here
+and but if nor not or so than then when where while"""
+_FUNCTION_WORDS = frozenset(_FUNCTION_TEXT.split())
+_NO_VERBS = frozenset({"building", "ceiling", "evening", "morning", "railing", "speed", "weed"})
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """One probe of one system: what was measured, from where on it is remarkable, and a plain sentence.
+
+    `kind` is `constant`, `word-bag`, `shuffled`, `stuffing`, `near-copy` or `truth-copy`; `value` is
+    None when it cannot be said, since there are too few captions. No text quotes a caption, since
+    that may be the truth's.
+    """
+
+    kind: str
+    name: str
+    value: float | None
+    text: str
+    threshold: float
+    threshold_text: str
+    flagged: bool
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exchange:
+    """Scores over the V videos with a hazard, with their own captions and with those of others.
+
+    `said` of the V videos have captions. BESM in [0, 1]; `detected` counts videos, on average.
+    """
+
+    videos: int
+    said: int
+    own_besm: float
+    other_besm: float
+    own_detected: float
+    other_detected: float
+
+
+def probe_board(
+    submissions: Sequence[Submission], truth: Sequence[TruthHazard], vectors: TextVectors, threshold: float
+) -> list[tuple[Probe, ...]]:
+    """Six probes of each submission, in the order of the submissions.
+
+    `vectors` holds every text of the submissions and the truth, `threshold` is that of detection.
+    Raises KeyError for a text without a vector and for a video that the truth does not know.
+    """
+    number = {video_id: n for n, video_id in enumerate(sorted({hazard.video_id for hazard in truth}))}
+    hazards = sorted(
+        (hazard for hazard in truth if not hazard.is_no_hazard), key=attrgetter("video_id", "hazard_id")
+    )
+    forms, words = number_forms(vectors.row_of)
+    hazard_video = np.array([number[hazard.video_id] for hazard in hazards], dtype=np.int64)
+    hazard_text = vectors.rows(hazard.description for hazard in hazards)
+    hazard_form = np.array([forms[hazard.description] for hazard in hazards], dtype=np.int64)
+    bags = word_bags(words, hazard_form)
+    long = np.array([len(words[form].split()) >= _COPIED_WORDS for form in hazard_form], dtype=np.bool_)
+    board = [number_captions(submission, number, vectors, forms) for submission in submissions]
+    copies = nearest_copies(board, vectors.units, len(number))
+    names = [submission.name for submission in submissions]
+    return [
+        (
+            _constant(captions),
+            _word_bag(captions, bags),
+            _shuffled(exchange(captions, hazard_video, hazard_text, vectors.units, threshold)),
+            _stuffing(captions),
+            _near_copy(captions, copy, names),
+            _truth_copy(captions, hazard_video[long], hazard_form[long]),
+        )
+        for captions, copy in zip(board, copies, strict=True)
+    ]
+
+
+def is_bag(words: Sequence[str]) -> bool:
+    """Whether plain words are strung together without a sentence (English; ours).
+
+    At least four words, none of them an article, preposition, auxiliary, pronoun or conjunction, and
+    fewer than one in five that ends like a verb (-ing, -ed). "deer crossing road" is headline style,
+    "car road person truck debris" is a bag.
+    """
+    if len(words) < _BAG_WORDS or not _FUNCTION_WORDS.isdisjoint(words):
+        return False
+    verbs = sum(w.endswith(("ing", "ed")) and len(w) > 4 and w not in _NO_VERBS for w in words)
+    return verbs * _WORDS_A_VERB < len(words)
+
+
+def word_bags(words: Sequence[str], truth_forms: Collection[int]) -> Sequence[bool] | None:
+    """Whether each of the plain texts is a bag of words that are mostly common in the truth.
+
+    Mostly: at least half of them are among the 50 most common content words of the truth. None when
+    half of the truth's own descriptions are bags: then it is not in sentences that this probe knows.
+    """
+    said = [words[form].split() for form in truth_forms]
+    if said and sum(map(is_bag, said)) * 2 >= len(said):
+        return None
+    counts = Counter(w for one in said for w in one if w not in _FUNCTION_WORDS)
+    ranked = sorted(counts, key=lambda word: (-counts[word], word))
+    common = frozenset(ranked[:_COMMON_WORDS])
+    split = (text.split() for text in words)
+    return [is_bag(one) and sum(w in common for w in one) * 2 >= len(one) for one in split]
+
+
+def exchange(
+    captions: NumberedCaptions, hazard_video: Index, hazard_text: Index, units: Real, threshold: float
+) -> Exchange:
+    """BESM and detection of the videos with a hazard when each has the captions of another one.
+
+    Each video is scored with the captions of every other one, and the mean is taken: this is what
+    random shuffles that leave no video its own captions come to. `hazard_video` (H,) is ascending,
+    `hazard_text` (H,) are rows of `units`. A video without captions scores 0.
+    """
+    videos = np.unique(hazard_video)
+    mine = np.isin(captions.video, videos)
+    # The same text twice in a video changes neither its best nor its worst.
+    said = np.unique(captions.video[mine] * len(units) + captions.text[mine])
+    video, text = said // max(len(units), 1), said % max(len(units), 1)
+    besm, detected = np.zeros(2), np.zeros(2)  # of all pairs of videos, of each with itself
+    for rows, of_video in whole_blocks(video):
+        vectors = units[text[rows]].astype(np.float32)
+        for hazards, of_hazard in whole_blocks(hazard_video):
+            cosines = (vectors @ units[hazard_text[hazards]].astype(np.float32).T).T
+            # Each caption takes its best-matching hazard, as in the score.
+            matched = np.ascontiguousarray(over_runs(np.maximum, cosines, of_hazard).T)
+            best = np.clip(over_runs(np.maximum, matched, of_video), 0.0, 1.0).astype(np.float64)
+            worst = np.clip(over_runs(np.minimum, matched, of_video), 0.0, 1.0)
+            own = video[rows][of_video, np.newaxis] == hazard_video[hazards][of_hazard]
+            both, found = (best + worst) / 2, passes(best, threshold)
+            besm += both.sum(), both[own].sum()
+            detected += found.sum(), found[own].sum()
+    n = len(videos)
+    others = max(n - 1, 1)
+    return Exchange(
+        videos=n,
+        said=len(np.unique(video)),
+        own_besm=float(besm[1]) / max(n, 1),
+        other_besm=float(besm[0] - besm[1]) / max(n, 1) / others,
+        own_detected=float(detected[1]),
+        other_detected=float(detected[0] - detected[1]) / others,
+    )
+
+
+def _constant(captions: NumberedCaptions) -> Probe:
+    parts = "constant", "Constant caption", CONSTANT, f"from {percent(CONSTANT)} of the videos"
+    videos = len(np.unique(captions.video))
+    if videos < _LEAST:
+        return _unsaid(*parts, f"Captions in {plural(videos, 'video')} are too few to say.")
+    pairs = np.unique(np.stack([captions.video, captions.form]), axis=1)
+    most = int(np.bincount(pairs[1]).max())
+    sentence = f"The most common caption is given in {most:,} of the {videos:,} videos that have captions."
+    return _share(*parts, most / videos, most / videos >= CONSTANT, sentence)
+
+
+def _word_bag(captions: NumberedCaptions, bags: Sequence[bool] | None) -> Probe:
+    parts = "word-bag", "Bag of common words", WORD_BAG, f"from {percent(WORD_BAG)} of the captions"
+    total = len(captions.form)
+    if bags is None:
+        return _unsaid(*parts, "The truth itself is not in English sentences, so this cannot be said.")
+    if total < _LEAST:
+        return _unsaid(*parts, f"{plural(total, 'caption')} in all: too few to say.")
+    count = sum(bags[form] for form in captions.form.tolist())
+    sentence = f"Common words strung together without a sentence: {count:,} of {total:,} captions."
+    return _share(*parts, count / total, count / total >= WORD_BAG, sentence)
+
+
+def _shuffled(found: Exchange) -> Probe:
+    parts = "shuffled", "Shuffled videos", SHUFFLED, f"from {percent(SHUFFLED)} of BESM"
+    if found.said < _LEAST_SHUFFLED:
+        few = f"Captions in {plural(found.said, 'video')} with a hazard are too few to say."
+        return _unsaid(*parts, few)
+    if found.own_besm <= 0:
+        return _unsaid(*parts, "BESM is 0 over the videos with a hazard, so nothing can be lost.")
+    kept = found.other_besm / found.own_besm
+    sentence = (
+        f"With the captions of other videos BESM is {found.other_besm:.4f} instead of {found.own_besm:.4f}, "
+        f"and {found.other_detected:.1f} instead of {found.own_detected:.0f} "
+        f"of the {found.videos:,} videos with a hazard are detected."
+    )
+    return _share(*parts, kept, kept >= SHUFFLED, sentence)
+
+
+def _stuffing(captions: NumberedCaptions) -> Probe:
+    parts = "stuffing", "Many captions a video", STUFFING, f"over {STUFFING:.0f} captions a video"
+    counts = np.unique(captions.video, return_counts=True)[1]
+    if not len(counts):
+        return _unsaid(*parts, "There are no captions.")
+    mean = float(counts.mean())
+    videos = plural(len(counts), "video")
+    sentence = f"Over {videos} with captions: {mean:.1f} captions on average, {counts.max():,} at most."
+    return Probe(*parts[:2], mean, f"{mean:.1f} captions a video", *parts[2:], mean > STUFFING, sentence)
+
+
+def _near_copy(captions: NumberedCaptions, copy: Copy | None, names: Sequence[str]) -> Probe:
+    parts = "near-copy", "Near copy", NEAR_COPY, f"from {percent(NEAR_COPY)} of the videos"
+    videos = len(np.unique(captions.video))
+    if videos < _LEAST:
+        return _unsaid(*parts, f"Captions in {plural(videos, 'video')} are too few to say.")
+    if copy is None:
+        return _unsaid(*parts, "There is no other submission.")
+    name = shorten(visible(names[copy.other]), _NAME_CHARS)
+    sentence = f"The same captions as “{name}” in {copy.same:,} of {plural(copy.either, 'video')}."
+    if not copy.same:
+        sentence = "In no video the same captions as another submission."
+    return _share(*parts, copy.share, copy.share >= NEAR_COPY, sentence)
+
+
+def _truth_copy(captions: NumberedCaptions, hazard_video: Index, hazard_form: Index) -> Probe:
+    wanted = f"from {percent(TRUTH_COPY)}, at least {_LEAST_COPIES} hazards"
+    parts = "truth-copy", "The truth's own words", TRUTH_COPY, wanted
+    total = len(hazard_form)
+    if not len(captions.form):
+        return _unsaid(*parts, "There are no captions.")
+    if not total:
+        return _unsaid(*parts, f"No hazard is described in {_COPIED_WORDS} words or more.")
+    said = set(zip(captions.video.tolist(), captions.form.tolist(), strict=True))
+    pairs = zip(hazard_video.tolist(), hazard_form.tolist(), strict=True)
+    count = sum(pair in said for pair in pairs)
+    sentence = f"Described in exactly the words of the truth: {count:,} of {plural(total, 'hazard')}."
+    flagged = count >= _LEAST_COPIES and count / total >= TRUTH_COPY
+    return _share(*parts, count / total, flagged, sentence)
+
+
+def _share(
+    kind: str, name: str, threshold: float, wanted: str, value: float, flagged: bool, sentence: str
+) -> Probe:
+    return Probe(kind, name, value, percent(value), threshold, wanted, flagged, sentence)
+
+
+def _unsaid(kind: str, name: str, threshold: float, wanted: str, sentence: str) -> Probe:
+    return Probe(kind, name, None, "cannot be said", threshold, wanted, False, sentence)
