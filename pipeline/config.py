@@ -179,10 +179,14 @@ class DemoSubmission(Settings):
     url: str = ""
     date: str = ""
     agents: str = ""
+    licence: str = ""
 
 
 class BenchmarkSettings(Settings):
-    """The content of `coooler.toml`: what a benchmark folder holds. Paths are relative to it."""
+    """The content of `coooler.toml`: what a benchmark folder holds. Paths are relative to it.
+
+    With `hide_truth` the site shows scores, but no truth text, hazard box, crop or cosine of a pair.
+    """
 
     name: str = Field(default="A COOOLER benchmark", min_length=1, max_length=120)
     description: str = ""
@@ -193,6 +197,7 @@ class BenchmarkSettings(Settings):
     site: str = "site"
     attribution: str = ""
     show_videos: bool = True
+    hide_truth: bool = False
     threshold: float = Field(default=0.80, ge=0, le=1)
     demo: tuple[DemoSubmission, ...] = ()
 

@@ -3,11 +3,59 @@
 import hashlib
 import os
 import re
+import shutil
+import sys
 import tempfile
 import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder, made when it is missing, so that one process at a time changes it (not on Windows)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if sys.platform == "win32":
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def sync_folder(folder: Path) -> None:
+    """Have the disk hold every file of a folder, and the folder's list of them."""
+    for path in (*sorted(folder.iterdir()), folder):
+        if sys.platform == "win32" and path.is_dir():
+            continue
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def linked_copy(source: Path, target: Path) -> None:
+    """Copy a tree by hard links where the file system allows it. `target` must not exist.
+
+    Safe for files that are only ever replaced, never written in place.
+    """
+    shutil.copytree(source, target, copy_function=_link, symlinks=True)
+
+
+def _link(source: str, target: str) -> str:
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+    return target
 
 
 @contextmanager

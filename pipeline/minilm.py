@@ -10,6 +10,7 @@ import json
 import os
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -247,4 +248,10 @@ def open_embedder(threads: int | None = None) -> CachedEmbedder:
     path = find_embedder()
     if path is None:
         raise ModelMissingError(f"The text embedder {MINILM} is not installed. Run: {INSTALL}")
-    return CachedEmbedder(OnnxEmbedder(path, threads), cache_folder() / "vectors")
+    return CachedEmbedder(_opened(path, threads), cache_folder() / "vectors")
+
+
+@lru_cache(maxsize=2)
+def _opened(path: Path, threads: int | None) -> OnnxEmbedder:
+    """The model, opened once a process: that takes longer than embedding a submission's captions."""
+    return OnnxEmbedder(path, threads)

@@ -5,9 +5,10 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from datetime import date as calendar_date
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -16,6 +17,7 @@ from pipeline.files import slug
 from sitegen.checks import show
 
 FILE_NAME = "submission.toml"
+MAX_BYTES = 64 * 1024
 
 
 def _plain(value: str) -> str:
@@ -38,8 +40,25 @@ _Line = Annotated[str, Field(max_length=500), AfterValidator(_plain)]
 _Hash = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """What the sender says of a submission; all but the name may be empty. `date` (ISO 8601): the system's."""
+
+    name: str
+    authors: str = ""
+    url: str = ""
+    date: str = ""
+    agents: str = ""
+    licence: str = ""
+    notes: str = ""
+
+
 class About(BaseModel):
-    """The content of `submission.toml`; an unknown key is an error. `config_sha256` may be empty."""
+    """The content of `submission.toml`; an unknown key is an error.
+
+    The name and `agents` to `notes` are the sender's words. `ending` is that of the original file
+    (`csv.gz`), empty in older files, where it is the format's. `config_sha256` may be empty.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -48,10 +67,34 @@ class About(BaseModel):
     url: Annotated[_Line, AfterValidator(_url)]
     date: Annotated[str, AfterValidator(_date)]
     agents: _Line
-    source_format: Literal["csv", "jsonl", "parquet"]
+    licence: _Line = ""
+    notes: Annotated[str, Field(max_length=2_000), AfterValidator(_plain)] = ""
+    source_format: Annotated[str, Field(pattern=r"^[a-z0-9]{1,16}$")]
+    ending: Annotated[str, Field(pattern=r"^([a-z0-9]{1,16}(\.[a-z0-9]{1,8})?)?$")] = ""
     original_sha256: _Hash
     predictions_sha256: _Hash
     config_sha256: _Hash | Literal[""] = ""
+
+    @property
+    def original(self) -> str:
+        """The name of the original file in the submission's folder."""
+        return f"original.{self.ending or self.source_format}"
+
+
+def read_sender(path: Path) -> Sender:
+    """What a TOML file says of a submission: the fields of `Sender`, `name` at least.
+
+    Raises InputError when it is not readable, holds another key, or a value is no text.
+    """
+    values = _toml_of(path)
+    known = [field.name for field in fields(Sender)]
+    wrong = [f"an unknown key {show(key)}" for key in values if key not in known]
+    wrong += [f"{key}: {show(value)}" for key, value in values.items() if not isinstance(value, str)]
+    if "name" not in values:
+        wrong.append("no name")
+    if wrong:
+        raise InputError(f"{path}: found {'; '.join(wrong)}; expected texts for {', '.join(known)}.")
+    return Sender(**values)
 
 
 def write(folder: Path, about: About) -> None:
@@ -86,8 +129,13 @@ def validated(values: Mapping[str, object], place: str) -> About:
 def read(folder: Path) -> About:
     """What a submission's folder says. Raises InputError when it is missing or wrong."""
     path = folder / FILE_NAME
+    return validated(_toml_of(path), str(path))
+
+
+def _toml_of(path: Path) -> dict[str, Any]:
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path}: over {MAX_BYTES // 1024} KB; expected a short TOML file.")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: not readable as TOML: {error}.") from error
-    return validated(values, str(path))

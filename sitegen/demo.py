@@ -13,9 +13,10 @@ from pipeline.errors import ConfigError
 from pipeline.files import slug
 from pipeline.places import Place
 from pipeline.run import find_videos
-from pipeline.scores import Evaluation
 from pipeline.tables import BOXES
+from sitegen.about import Sender
 from sitegen.board import build_board, submit_file
+from sitegen.standings import Standing
 
 NAME = "coooler-demo"
 
@@ -43,7 +44,7 @@ def demo_folder(work: Path | None) -> Benchmark:
     return open_benchmark(target)
 
 
-def run_demo(out: Path, work: Path | None, workers: int) -> Sequence[Evaluation]:
+def run_demo(out: Path, work: Path | None, workers: int) -> Sequence[Standing]:
     """Run the demo's configurations on its clips, submit them, build the site into `out`."""
     benchmark = demo_folder(work)
     clips, boxes = find_videos(Place(str(benchmark.videos))), BOXES.read(benchmark.boxes)
@@ -57,9 +58,8 @@ def run_demo(out: Path, work: Path | None, workers: int) -> Sequence[Evaluation]
             console.stdout().print(f"{entry.name}: {snippets_line(report)}", markup=False, soft_wrap=True)
         if not entry.board:
             continue
-        submit_file(
-            benchmark, file, entry.name, entry.authors, entry.url, entry.agents, entry.date, replace=True
-        )
+        sender = Sender(entry.name, entry.authors, entry.url, entry.date, entry.agents, entry.licence)
+        submit_file(benchmark, file, sender, replace=True)
     with console.progress() as bar:
-        evaluations, _ = build_board(benchmark, out, bar)
-    return evaluations
+        board, _ = build_board(benchmark, out, bar)
+    return board

@@ -1,54 +1,46 @@
-"""The ledger of a benchmark: one JSON line for every submission added, replaced or withdrawn.
+"""The ledger of a benchmark: one JSON line for every submission added, replaced, rescored or withdrawn.
 
 It only grows. Each line holds the SHA-256 of the line before, so that a change shows.
 """
 
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pipeline.errors import InputError
 from pipeline.files import sha256_of, write_bytes
 
-if sys.platform != "win32":
-    import fcntl
-
 FILE_NAME = "ledger.jsonl"
 FIRST = "0" * 64
 
+Event: TypeAlias = Literal["add", "replace", "rescore", "withdraw"]
+
 
 class Entry(BaseModel):
-    """One line. `reason` is empty unless something was withdrawn; `previous` is 64 zeros at first."""
+    """One line: what happened to which submission, on which day, why, and with which scores.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    `add` and `replace` bring content, whose hashes they hold; `rescore` brings scores under another
+    signature; `withdraw` takes the submission off the board. `previous` is the hash of the line before,
+    64 zeros at first. `date` is ISO 8601 and never before that of the line before.
+    """
 
-    event: Literal["add", "replace", "withdraw"]
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    event: Event
     slug: str
     name: str
     date: str
     predictions_sha256: str
+    original_sha256: str = ""
     reason: str = ""
+    signature: str = ""
+    besm: float | None = None
+    sam: float | None = None
+    detection_rate: float | None = None
+    hazard_recall: float | None = None
     previous: str = FIRST
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the submissions folder, so that one process at a time changes it (not on Windows)."""
-    folder.mkdir(parents=True, exist_ok=True)
-    if sys.platform == "win32":
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
 
 
 def read(folder: Path) -> list[Entry]:
@@ -78,18 +70,44 @@ def read(folder: Path) -> list[Entry]:
     return entries
 
 
-def append(folder: Path, entry: Entry) -> None:
-    """Add an entry, whole or not at all, with `previous` filled in. Call it inside `locked`."""
+def append(folder: Path, new: Sequence[Entry]) -> None:
+    """Add entries, all or none, with `previous` filled in. Call it while the folder is locked.
+
+    An entry that is dated before the line before takes that line's date.
+    """
+    if not new:
+        return
     path = folder / FILE_NAME
-    read(folder)
+    entries = read(folder)
     before = path.read_bytes() if path.exists() else b""
     lines = before.splitlines()
-    linked = entry.model_copy(update={"previous": sha256_of(lines[-1]) if lines else FIRST})
+    previous = sha256_of(lines[-1]) if lines else FIRST
+    date = entries[-1].date if entries else ""
+    added = b""
+    for entry in new:
+        date = max(date, entry.date)
+        line = entry.model_copy(update={"previous": previous, "date": date}).model_dump_json().encode()
+        previous = sha256_of(line)
+        added += line + b"\n"
     end = b"" if before.endswith(b"\n") or not before else b"\n"
-    write_bytes(path, before + end + linked.model_dump_json().encode() + b"\n")
+    write_bytes(path, before + end + added)
 
 
-def withdrawn(entries: list[Entry]) -> set[str]:
+def until(entries: Iterable[Entry], date: str) -> list[Entry]:
+    """The entries up to and including a day (ISO 8601); all of them for an empty date."""
+    return [entry for entry in entries if not date or entry.date <= date]
+
+
+def withdrawn(entries: Iterable[Entry]) -> set[str]:
     """The slugs whose last event is a withdrawal."""
     last = {entry.slug: entry.event for entry in entries}
     return {slug for slug, event in last.items() if event == "withdraw"}
+
+
+def versions(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
+    """Slug -> the entries that brought content, oldest first: version 1, 2, ..."""
+    found: dict[str, list[Entry]] = {}
+    for entry in entries:
+        if entry.event in {"add", "replace"}:
+            found.setdefault(entry.slug, []).append(entry)
+    return found

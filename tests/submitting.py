@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from sitegen import ledger
+from sitegen.about import Sender
 from sitegen.readers import read_predictions
 from sitegen.submissions import store
 
@@ -21,16 +22,10 @@ class Bench:
         """Store `content` as a submission."""
         original = self.root / "given.csv"
         original.write_text(content)
-        given: dict[str, Any] = {
-            "name": name,
-            "authors": "Ann",
-            "url": "https://example.org/a",
-            "date": "2026-01-02",
-            "agents": "none",
-            "read": read_predictions(original),
-            "original": original,
-        }
-        return store(self.folder, **{**given, **more})
+        said = {"authors": "Ann", "url": "https://example.org/a", "date": "2026-01-02", "agents": "none"}
+        said.update({field: more.pop(field) for field in Sender.__slots__ if field in more})
+        read = more.pop("read", None) or read_predictions(original)
+        return store(self.folder, Sender(name, **said), read, more.pop("original", original), **more)
 
     def events(self) -> list[tuple[str, str]]:
         """What the ledger says."""

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import FaultsError, InputError
+from pipeline.files import sha256_file
 from pipeline.records import Prediction, TruthHazard
 from pipeline.tables import PREDICTIONS
 from sitegen import about as about_file
@@ -26,6 +27,17 @@ def test_predictions_changed_by_hand(bench: Bench) -> None:
     folder = bench.submit()
     PREDICTIONS.write(folder / "predictions.parquet", [Prediction("v1", 1, "Better.")])
     with pytest.raises(InputError, match="changed by hand"):
+        load_all(bench.folder)
+
+
+def test_predictions_and_their_hash_changed_by_hand(bench: Bench) -> None:
+    folder = bench.submit()
+    before = sha256_file(folder / "predictions.parquet")
+    PREDICTIONS.write(folder / "predictions.parquet", [Prediction("v1", 1, "Better.")])
+    after = sha256_file(folder / "predictions.parquet")
+    about = folder / "submission.toml"
+    about.write_text(about.read_text().replace(before, after))
+    with pytest.raises(InputError, match=f"{after[:12]}, the ledger says {before[:12]}"):
         load_all(bench.folder)
 
 
@@ -48,14 +60,18 @@ def test_every_wrong_folder_is_told_of(bench: Bench) -> None:
     (bench.submit("B") / "submission.toml").write_text("name = ")
     (bench.folder / "c").mkdir()
     (bench.submit("D") / "stages.parquet").symlink_to("/etc/passwd")
+    renamed = bench.submit("E") / "submission.toml"
+    renamed.write_text(renamed.read_text().replace('"E"', '"F"'))
     with pytest.raises(InputError) as caught:
         load_all(bench.folder)
     message = str(caught.value)
     for part in (
-        "must be named 'a'",
+        "submissions/a: found nothing; the ledger says",
         "b/submission.toml: not readable",
-        "c/submission.toml",
+        "c: is not in the ledger",
         "symbolic link",
+        "e: is named 'F'; the ledger says that 'e' lies there",
+        "z: is not in the ledger",
     ):
         assert part in message
 

@@ -189,7 +189,13 @@ def test_the_ledger_is_a_chain(bench: Bench) -> None:
         "name",
         "date",
         "predictions_sha256",
+        "original_sha256",
         "reason",
+        "signature",
+        "besm",
+        "sam",
+        "detection_rate",
+        "hazard_recall",
         "previous",
     ]
     path.write_bytes(b"\n".join([lines[0].replace(b'"A"', b'"Z"'), *lines[1:]]) + b"\n")

@@ -1,0 +1,135 @@
+"""What the commands of scores and boards share: options, reading a file, and the printed board."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipeline import console
+
+if TYPE_CHECKING:
+    from pipeline.benchmark import Benchmark
+    from pipeline.records import TruthHazard
+    from pipeline.scores import Evaluation, Submission
+    from sitegen.readers import ReadOptions, ReadPredictions
+
+FileArgument = Annotated[
+    Path, typer.Argument(help="Predictions in any format that `check` knows, or a run folder.")
+]
+TruthOption = Annotated[
+    Path | None, typer.Option(help="Truth: Parquet, CSV or JSON Lines. Default: the benchmark folder's.")
+]
+FormatOption = Annotated[
+    str,
+    typer.Option(
+        "--format", help="csv, jsonl, parquet, coool, 2coool, scripts or coco. Default: look into the file."
+    ),
+]
+CaptionOption = Annotated[
+    str, typer.Option("--caption-column", help="Column of a 2COOOL file that holds the caption.")
+]
+MapOption = Annotated[
+    Path | None,
+    typer.Option("--video-map", help="CSV (file_id,video_id) or JSON object: the file's ids to the truth's."),
+]
+OutOption = Annotated[Path | None, typer.Option(help="Folder of the site. Default: site/ here.")]
+DateOption = Annotated[str, typer.Option(help="Date as YYYY-MM-DD. Default: today.")]
+
+
+def here() -> "Benchmark":
+    """The benchmark folder that the command runs in."""
+    from pipeline.benchmark import find_benchmark
+
+    return find_benchmark(Path.cwd())
+
+
+def today() -> str:
+    """Today, ISO 8601."""
+    from datetime import date
+
+    return date.today().isoformat()
+
+
+def options_of(source_format: str, caption_column: str, video_map: Path | None) -> "ReadOptions":
+    """The options of reading, the map read."""
+    from sitegen.readers import FORMATS, ReadOptions, read_video_map
+
+    if source_format and source_format not in FORMATS:
+        raise typer.BadParameter(f"found {source_format!r}; expected one of {', '.join(FORMATS)}")
+    return ReadOptions(source_format, caption_column, read_video_map(video_map) if video_map else {})
+
+
+def read_file(
+    file: Path, truth: "Sequence[TruthHazard]", options: "ReadOptions"
+) -> "tuple[Path, ReadPredictions]":
+    """The predictions file meant by `file`, and what it holds.
+
+    A Parquet file is read in a process of its own: a damaged one can end the process that reads it.
+    """
+    from sitegen.board import predictions_of
+    from sitegen.readers import read_predictions
+    from sitegen.sandbox import read_apart
+
+    path = predictions_of(file)
+    apart = _holds_parquet(path)
+    return path, read_apart(path, truth, options) if apart else read_predictions(path, truth, options)
+
+
+def _holds_parquet(path: Path) -> bool:
+    """Whether a file may be Parquet, packed or not: only CSV and JSON can be told from their first byte."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as source:
+            head = source.read(4)
+    except OSError:
+        return False
+    return head[:4] == b"PAR1" or head[:2] in {b"\x1f\x8b", b"PK"} or head == b"\x28\xb5\x2f\xfd"
+
+
+def submission_of(name: str, read: "ReadPredictions") -> "Submission":
+    """Predictions that nobody sent yet."""
+    from pipeline.scores import Submission
+
+    return Submission(name, "", "", "", read.source_format, read.predictions, read.warnings)
+
+
+def say_warnings(warnings: Sequence[str]) -> None:
+    """Each on a line of its own, on standard error."""
+    for warning in warnings:
+        console.stderr().print(f"warning: {warning}", markup=False)
+
+
+def print_board(evaluations: "Sequence[Evaluation]") -> None:
+    """The scores as a table, best first, with their 95 % intervals and the one signature that they share."""
+    from rich.table import Table
+
+    from sitegen.leaderboard import rank
+    from sitegen.uncertainty import uncertainties
+
+    if not evaluations:
+        console.stdout().print("no submissions yet: coooler submit FILE --name NAME", markup=False)
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("rank", "submission", "BESM", "95 %", "SAM", "detection", "hazard recall", "videos"):
+        table.add_column(heading, justify="left" if heading == "submission" else "right")
+    rows = rank(evaluations, "besm", uncertainties(evaluations))
+    bands = [row.rank for row in rows]
+    for row in rows:
+        card = row.evaluation.card
+        recall = "-" if card.hazard_recall is None else f"{card.hazard_recall:.4f}"
+        interval = row.uncertainty.besm if row.uncertainty else None
+        table.add_row(
+            f"{row.rank}=" if bands.count(row.rank) > 1 else str(row.rank),
+            row.evaluation.submission.name,
+            f"{card.besm:.4f}",
+            f"{interval.low:.4f} to {interval.high:.4f}" if interval else "",
+            f"{card.sam:.4f}",
+            f"{card.detection_rate:.4f}",
+            recall,
+            str(card.n_videos),
+        )
+    output = console.stdout()
+    output.print(table)
+    output.print(f"signature {evaluations[0].card.signature}", markup=False, soft_wrap=True)
