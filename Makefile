@@ -39,7 +39,7 @@ $(TOOL): pyproject.toml constraints.txt models.txt
 	touch $@
 
 $(ALL): $(TOOL)
-	$(PY) -m pip install --quiet --constraint constraints.txt --editable '.[dev,ray,local-llm]'
+	$(PY) -m pip install --quiet --constraint constraints.txt --editable '.[dev,ray,local-llm,server]'
 	touch $@
 
 clean:
