@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from pipeline.benchmark import Benchmark
-from pipeline.errors import OutsideError
+from pipeline.errors import InputError, OutsideError
 from pipeline.files import sha256_of
-from pipeline.scores import Evaluation
 from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
 from sitegen.gathered import VideoMedia, path_names
 from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json
 from sitegen.output import Output, open_output, stamped, tree_sha256
 from sitegen.pages import Page, data_files, make_pages
-from sitegen.submissions import StoredSubmission
+from sitegen.standings import Standing
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -29,6 +28,7 @@ Tell = Callable[[str, int, int], None]
 
 PLOTLY = "assets/plotly.min.js"
 _FEW = 2  # starting processes costs more than this many clips
+_OURS = ("data", "media", "submissions", "videos")  # folders of a site that only a build fills
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +50,19 @@ class BuildReport:
 def build_site(
     benchmark: Benchmark,
     out: Path,
-    board: Sequence[tuple[StoredSubmission, Evaluation]],
+    board: Sequence[Standing],
     bar: "Progress | None" = None,
     *,
     settings: MediaSettings | None = None,
     jobs: int = 2,
+    as_of: str = "",
 ) -> BuildReport:
     """Build the site of `benchmark` with the scored submissions of `board` in the folder `out`.
 
     The same inputs give the same bytes in every folder. Pictures of a video are made again only
-    when its clip, its boxes or the settings changed. Raises InputError when the truth, the boxes,
-    the records or the attribution cannot be read.
+    when its clip, its boxes or the settings changed. `as_of` is the day (ISO 8601) up to which the
+    ledger is shown. Raises InputError when the truth, the boxes, the records or the attribution cannot
+    be read, and when the truth is hidden but `out` holds what an unknown build left there.
     """
     tell = _telling(bar)
     truth = read_truth_by_video(benchmark)
@@ -69,15 +71,17 @@ def build_site(
     output = open_output(out)
     todo = media_jobs(benchmark, names, boxes, settings or MediaSettings())
     media, remembered, decoded = _all_media(output, todo, jobs, tell)
-    data = gather(benchmark, truth, boxes, media, board)
+    data = gather(benchmark, truth, boxes, media, board, as_of)
 
     output.add_all(_assets(with_charts=bool(board)))
     output.add_all(data_files(data))
-    pages = _rendered(make_pages(data), len(names) + len(board) + 3, tell)
+    pages = _rendered(make_pages(data), len(names) + len(board) + 6, tell)
     blank = {path: sha256_of(page) for path, page in pages.items()}
     digest = tree_sha256({**output.files, **blank})
     output.add_all((path, stamped(page, digest)) for path, page in pages.items())
     removed = output.finish(remembered)
+    if data.hidden:
+        _nothing_left(output)
     size = sum(output.sizes.values())
     return BuildReport(out, output.written, output.unchanged, removed, decoded, digest, size)
 
@@ -132,6 +136,18 @@ def _rendered(pages: Iterator[Page], total: int, tell: Tell) -> dict[str, bytes]
         rendered[page.path] = text.encode()
         tell("Rendering pages", done, total)
     return rendered
+
+
+def _nothing_left(output: Output) -> None:
+    """Raise InputError for files that no known build made, where an earlier one may have shown the truth."""
+    paths = (path for folder in _OURS for path in sorted((output.folder / folder).rglob("*")))
+    found = [path.relative_to(output.folder).as_posix() for path in paths if not path.is_dir()]
+    left = [path for path in found if path not in output.files]
+    if left:
+        raise InputError(
+            f"{output.folder}: {len(left)} files in it are not of this build, such as {left[0]}; they may "
+            "show the truth, which is to be hidden. Remove the folder and build again."
+        )
 
 
 def _assets(with_charts: bool) -> Iterator[tuple[str, bytes]]:

@@ -7,7 +7,7 @@ names of the page's own variables (`--chart-1`, ...), which the script resolves 
 import html
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from sitegen.words import shorten, visible
 
@@ -37,26 +37,39 @@ def _colour(place: int) -> str:
     return f"--chart-{place % COLOURS + 1}"
 
 
-def besm_against_sam(systems: Sequence[tuple[str, float, float, float]]) -> Figure:
-    """A point a system: (name, BESM, SAM, detection rate), all figures in [0, 1]."""
+class Point(NamedTuple):
+    """A system's figures, all in [0, 1]; the intervals are (low, high)."""
+
+    name: str
+    besm: float
+    sam: float
+    detection_rate: float
+    besm_interval: tuple[float, float]
+    sam_interval: tuple[float, float]
+
+
+def besm_against_sam(systems: Sequence[Point]) -> Figure:
+    """A point a system, with its 95 % intervals."""
     traces = [
         {
             "type": "scatter",
             "mode": "markers+text",
-            "x": [round(besm, 6)],
-            "y": [round(sam, 6)],
-            "name": label(name),
-            "text": [label(name, 28)],
+            "x": [round(point.besm, 6)],
+            "y": [round(point.sam, 6)],
+            "error_x": _whiskers(point.besm, point.besm_interval, place),
+            "error_y": _whiskers(point.sam, point.sam_interval, place),
+            "name": label(point.name),
+            "text": [label(point.name, 28)],
             "textposition": "top center" if place % 2 == 0 else "bottom center",
             "cliponaxis": False,
             "marker": {"size": 12, "color": _colour(place), "symbol": place % 8},
-            "hovertemplate": f"{label(name)}<br>BESM %{{x:.4f}}<br>SAM %{{y:.4f}}"
-            f"<br>detection {rate * 100:.1f} %<extra></extra>",
+            "hovertemplate": f"{label(point.name)}<br>BESM %{{x:.4f}}<br>SAM %{{y:.4f}}"
+            f"<br>detection {point.detection_rate * 100:.1f} %<extra></extra>",
         }
-        for place, (name, besm, sam, rate) in enumerate(systems)
+        for place, point in enumerate(systems)
     ]
-    values = [value for _, besm, sam, _ in systems for value in (besm, sam)]
-    low, high = max(0.0, min(values, default=0.0) - 0.1), min(1.0, max(values, default=1.0) + 0.1)
+    ends = [end for point in systems for end in (*point.besm_interval, *point.sam_interval)]
+    low, high = max(0.0, min(ends, default=0.0) - 0.05), min(1.0, max(ends, default=1.0) + 0.05)
     diagonal = {
         "type": "line",
         "x0": low,
@@ -73,6 +86,19 @@ def besm_against_sam(systems: Sequence[tuple[str, float, float, float]]) -> Figu
             "shapes": [diagonal],
             "showlegend": False,
         },
+    }
+
+
+def _whiskers(value: float, interval: tuple[float, float], place: int) -> Figure:
+    low, high = interval
+    return {
+        "type": "data",
+        "symmetric": False,
+        "array": [round(max(0.0, high - value), 6)],
+        "arrayminus": [round(max(0.0, value - low), 6)],
+        "color": _colour(place),
+        "thickness": 1,
+        "width": 0,
     }
 
 

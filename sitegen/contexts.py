@@ -6,12 +6,16 @@ Paths are from the site's root; `Shell.root` leads there from the page ("" or ".
 from dataclasses import dataclass
 
 from sitegen.blocks import Block
+from sitegen.judgements import AgreementTable
 from sitegen.numerals import Score
 
 
 @dataclass(frozen=True, slots=True)
 class Shell:
-    """What every page has. `section` names the entry of the menu that the page belongs to."""
+    """What every page has; `section` names the entry of the menu that it belongs to.
+
+    With `hidden` the menu leaves out the pages that would tell of the truth.
+    """
 
     title: str
     description: str
@@ -19,6 +23,7 @@ class Shell:
     section: str
     benchmark: str
     version: str
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,22 +35,54 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
-class BoardRow:
-    """A row of the leaderboard; `key` holds what search looks through, in lower case."""
+class Measure:
+    """A number with its 95 % interval: as text, and its ends in whole percent of the full scale."""
 
-    rank: int
+    score: Score
+    interval: str
+    low: int
+    high: int
+
+
+@dataclass(frozen=True, slots=True)
+class BoardRow:
+    """A row of the leaderboard; `key` holds what search looks through, in lower case.
+
+    `place` is that of the score alone; `ranks` and `first` say how stable the rank is; `flags` says how
+    many probes speak, and is empty when none does.
+    """
+
+    place: int
     rank_text: str
+    ranks: str
+    first: Score
     slug: str
     name: str
     authors: str
     agents: str
     is_baseline: bool
-    besm: Score
-    sam: Score
-    detection: Score
-    recall: Score | None
+    is_rehearsed: bool
+    flags: str
+    besm: Measure
+    sam: Measure
+    detection: Measure
+    recall: Measure | None
     date: str
     key: str
+
+
+@dataclass(frozen=True, slots=True)
+class LedgerLine:
+    """A line of the ledger; `slug` is empty when the submission has no page (any more)."""
+
+    date: str
+    event: str
+    name: str
+    slug: str
+    reason: str
+    sha256: str
+    scores: str
+    signature: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +138,16 @@ class VideoCard:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A name and a value; `code` asks for a monospaced value, `href` makes it a link out."""
+    """A name and a value; `code` asks for a monospaced value, `href` makes it a link out.
+
+    `note` is a small line below the value.
+    """
 
     name: str
     value: str
     code: bool = False
     href: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +157,15 @@ class LeaderboardPage:
     shell: Shell
     facts: tuple[Fact, ...]
     paragraphs: tuple[str, ...]
+    hidden: bool
     rows: tuple[BoardRow, ...]
     signatures: tuple[str, ...]
     threshold: str
+    downloads: tuple[Link, ...]
+    published: tuple[Fact, ...]
+    ledger: tuple[LedgerLine, ...]
+    ledger_summary: str
+    ledger_file: str
     charts: tuple[Chart, ...]
     chart_data: str
     heat: tuple[HeatRow, ...]
@@ -130,6 +177,7 @@ class VideosPage:
     """videos.html"""
 
     shell: Shell
+    hidden: bool
     cards: tuple[VideoCard, ...]
     summary: str
     threshold: str
@@ -137,15 +185,34 @@ class VideosPage:
 
 @dataclass(frozen=True, slots=True)
 class VideoLine:
-    """A video in a submission's table."""
+    """A video in a submission's table; when the truth is hidden, `judged` is None."""
 
     video_id: str
     href: str
-    labels: str
     captions: tuple[str, ...]
+    judged: "JudgedLine | None"
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedLine:
+    """How a submission did on a video."""
+
+    labels: str
     best: Score
     besm: Score
     sam: Score
+    verdict: str
+    verdict_text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeLine:
+    """A probe; `verdict` is `quiet`, `speaks` or `unsaid`, and `verdict_text` the same in words."""
+
+    name: str
+    sentence: str
+    value: str
+    threshold: str
     verdict: str
     verdict_text: str
 
@@ -171,12 +238,18 @@ class SubmissionPage:
     name: str
     agents: str
     is_baseline: bool
+    is_rehearsed: bool
+    hidden: bool
     rank_text: str
+    standing: tuple[str, ...]
     cards: tuple[Fact, ...]
+    probes: tuple[ProbeLine, ...]
+    probes_summary: str
     lines: tuple[VideoLine, ...]
     best: tuple[Extreme, ...]
     worst: tuple[Extreme, ...]
     provenance: tuple[Fact, ...]
+    ledger: tuple[LedgerLine, ...]
     warnings: tuple[str, ...]
     signature: str
     threshold: str
@@ -217,12 +290,15 @@ class MethodPage:
     """method.html"""
 
     shell: Shell
+    hidden: bool
     threshold: str
     signature: str
+    probes: tuple[tuple[str, str, str], ...]
     signature_parts: tuple[tuple[str, str], ...]
     prompts: tuple[PromptView, ...]
     models: tuple[ModelView, ...]
     systems: tuple[tuple[str, str, str], ...]
     attribution: tuple[Block, ...]
     attribution_rest: tuple[Block, ...]
+    agreement: AgreementTable
     verify: str

@@ -6,19 +6,32 @@ from typing import TypeVar
 from pipeline.benchmark import Benchmark
 from pipeline.errors import ConfigError
 from pipeline.files import sha256_file
-from pipeline.records import Match, Snippet, StageOutput, TrackBox, TruthHazard, VideoOutcome
-from pipeline.scores import Evaluation
+from pipeline.records import (
+    Match,
+    Snippet,
+    StageOutput,
+    TrackBox,
+    TruthHazard,
+    UsageRow,
+    VideoOutcome,
+)
 from pipeline.table import Table
-from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES
+from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES, USAGE
+from sitegen import ledger
 from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names
-from sitegen.leaderboard import rank
+from sitegen.hiding import totals_only, videos_only, words_only
+from sitegen.leaderboard import Ranked, rank
+from sitegen.ledger import Entry
 from sitegen.media import MediaJob, MediaSettings
 from sitegen.readers import read_truth
+from sitegen.standings import Standing
 from sitegen.submissions import StoredSubmission
+from sitegen.uncertainty import Uncertainty, require_same_signature, uncertainties
+from sitegen.votes import load_votes
 
 CLIPS = (".mp4", ".m4v", ".webm", ".mov", ".mkv", ".avi")
 
-R = TypeVar("R", TrackBox, StageOutput, Snippet, Match, VideoOutcome, TruthHazard)
+R = TypeVar("R", TrackBox, StageOutput, Snippet, Match, VideoOutcome, TruthHazard, UsageRow)
 
 
 def read_truth_by_video(benchmark: Benchmark) -> dict[str, tuple[TruthHazard, ...]]:
@@ -27,8 +40,8 @@ def read_truth_by_video(benchmark: Benchmark) -> dict[str, tuple[TruthHazard, ..
 
 
 def read_boxes(benchmark: Benchmark, video_ids: Iterable[str]) -> dict[str, tuple[TrackBox, ...]]:
-    """Video id -> all boxes of it; empty when the benchmark has no table of boxes."""
-    if not benchmark.boxes.is_file():
+    """Video id -> all boxes of it; empty when there is no table of boxes, or when the truth is hidden."""
+    if benchmark.settings.hide_truth or not benchmark.boxes.is_file():
         return {}
     wanted = set(video_ids)
     rows = [row for row in BOXES.read(benchmark.boxes) if row.video_id in wanted]
@@ -74,23 +87,53 @@ def gather(
     truth: Mapping[str, tuple[TruthHazard, ...]],
     boxes: Mapping[str, tuple[TrackBox, ...]],
     media: Mapping[str, VideoMedia],
-    board: Sequence[tuple[StoredSubmission, Evaluation]],
+    board: Sequence[Standing],
+    as_of: str = "",
 ) -> SiteData:
-    """All data of the site; systems best first. Raises InputError when their signatures differ."""
-    stored = {evaluation.submission.name: one for one, evaluation in board}
-    ranked = rank([evaluation for _, evaluation in board])
-    systems = [_system(row.rank, stored[row.evaluation.submission.name], row.evaluation) for row in ranked]
+    """All data of the site; systems best first. Raises InputError when their signatures differ.
+
+    When the organiser keeps the truth back, nothing of it is in the data; see `hiding`. `as_of` is the
+    day (ISO 8601) up to which the ledger is shown, all of it when empty.
+    """
+    hidden = benchmark.settings.hide_truth
+    evaluations = [standing.evaluation for standing in board]
+    require_same_signature(evaluations)
+    unsure = uncertainties(evaluations)
+    names = [evaluation.submission.name for evaluation in evaluations]
+    known = dict(zip(names, zip(board, unsure, strict=True), strict=True))
+    ranked = rank(evaluations, "besm", unsure)
+    systems = [_system(row, *known[row.evaluation.submission.name], hidden) for row in ranked]
     on_keyframes = {}
     for video_id, rows in boxes.items():
         wanted = {frame.index for frame in media[video_id].frames}
         on_keyframes[video_id] = tuple(row for row in rows if row.frame_index in wanted)
-    attribution = read_attribution(benchmark)
+    entries, ledger_file = read_ledger(benchmark, as_of)
     return SiteData(
-        benchmark.settings, truth, on_keyframes, media, path_names(truth), tuple(systems), attribution
+        benchmark.settings,
+        videos_only(truth) if hidden else truth,
+        on_keyframes,
+        media,
+        path_names(truth),
+        tuple(systems),
+        read_attribution(benchmark),
+        entries,
+        ledger_file,
+        load_votes(benchmark, {one.stored.slug: one.stored.predictions_sha256 for one in board}),
     )
 
 
-def _system(place: int, stored: StoredSubmission, evaluation: Evaluation) -> System:
+def read_ledger(benchmark: Benchmark, as_of: str) -> tuple[tuple[Entry, ...], bytes]:
+    """The ledger's entries up to a day, and their lines as they lie on disk; nothing when there is none."""
+    path = benchmark.submissions / ledger.FILE_NAME
+    if not path.is_file():
+        return (), b""
+    entries = ledger.until(ledger.read(benchmark.submissions), as_of)
+    lines = path.read_bytes().splitlines(keepends=True)
+    return tuple(entries), b"".join(lines[: len(entries)])
+
+
+def _system(row: Ranked, standing: Standing, uncertainty: Uncertainty, hidden: bool) -> System:
+    stored, evaluation = standing.stored, standing.evaluation
     stages, snippets = _table(stored, STAGES), _table(stored, SNIPPETS)
     matches = _table(stored, MATCHES)
     outcomes = {row.video_id: row for rows in _table(stored, OUTCOMES).values() for row in rows}
@@ -109,7 +152,24 @@ def _system(place: int, stored: StoredSubmission, evaluation: Evaluation) -> Sys
         ("SHA-256 of the configuration", stored.config_sha256),
     )
     agents = stored.agents or "Not stated"
-    return System(place, stored.slug, agents, "baseline" in agents.casefold(), evaluation, facts, records)
+    return System(
+        rank=row.rank,
+        place=row.place,
+        slug=stored.slug,
+        agents=agents,
+        is_baseline="baseline" in agents.casefold(),
+        evaluation=totals_only(evaluation) if hidden else evaluation,
+        uncertainty=uncertainty,
+        predictions_sha256=stored.predictions_sha256,
+        facts=facts,
+        records=words_only(records) if hidden else records,
+        probes=standing.probes,
+        history=standing.history,
+        usage=tuple(row for rows in _table(stored, USAGE).values() for row in rows),
+        licence=stored.licence,
+        notes=stored.notes,
+        rehearsed=standing.rehearsed,
+    )
 
 
 def _table(stored: StoredSubmission, table: Table[R]) -> dict[str, tuple[R, ...]]:

@@ -16,13 +16,36 @@ from pipeline.records import (
     StageOutput,
     TrackBox,
     TruthHazard,
+    UsageRow,
     VideoOutcome,
 )
 from pipeline.scores import Evaluation, PairScore, VideoScore
+from sitegen.judgements import Votes
+from sitegen.ledger import Entry
+from sitegen.probes import Probe
+from sitegen.uncertainty import Uncertainty
 
 V = TypeVar("V", PairScore, Prediction)
 
 _SAFE_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,78}[A-Za-z0-9_-])?")
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """A result that was printed on other data, which no rank here can hold."""
+
+    system: str
+    besm: float
+    sam: float
+    n_videos: int
+    threshold: float
+    source: str
+
+
+# Paper, table 1.
+PUBLISHED = Published(
+    "COOOLER, the paper's pipeline with its own models", 0.3922, 0.3922, 200, 0.80, "Shriram et al. 2025"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,17 +109,28 @@ class Records:
 class System:
     """A submission with its scores and everything recorded about how it came about.
 
-    `rank` counts from 1 and is shared by equal scores; `agents` says plainly who produced it;
-    `facts` are provenance lines (name, value); `records` maps a video id to its records.
+    `rank` counts from 1 and is shared by all that cannot be told apart; `place` is where its score
+    alone puts it; `agents` says plainly who produced it; `facts` are provenance lines (name, value);
+    `records` maps a video id to its records; `history` is what the ledger holds of it, oldest first;
+    `rehearsed` marks a preview, which is not on the board.
     """
 
     rank: int
+    place: int
     slug: str
     agents: str
     is_baseline: bool
     evaluation: Evaluation
+    uncertainty: Uncertainty
+    predictions_sha256: str
     facts: tuple[tuple[str, str], ...] = ()
     records: Mapping[str, Records] = field(default_factory=dict)
+    probes: tuple[Probe, ...] = ()
+    history: tuple[Entry, ...] = ()
+    usage: tuple[UsageRow, ...] = ()
+    licence: str = ""
+    notes: str = ""
+    rehearsed: bool = False
 
     @property
     def name(self) -> str:
@@ -124,7 +158,10 @@ class System:
 class SiteData:
     """All inputs of the pages. `systems` come best first; mappings are keyed by video id.
 
-    `boxes` holds the boxes on the keyframes only; `names` maps a video id to its path part.
+    `boxes` holds the boxes on the keyframes only; `names` maps a video id to its path part;
+    `ledger_file` is the ledger as it lies on disk, `votes` are people's on pairs of captions. With
+    `hidden` nothing here tells of the truth: every video has no rows, and no system has scores of
+    pairs or single videos.
     """
 
     settings: BenchmarkSettings
@@ -134,6 +171,19 @@ class SiteData:
     names: Mapping[str, str]
     systems: tuple[System, ...]
     attribution: str = ""
+    ledger: tuple[Entry, ...] = ()
+    ledger_file: bytes = b""
+    votes: Votes = field(default_factory=Votes)
+
+    @property
+    def hidden(self) -> bool:
+        """Whether the organiser keeps the truth back."""
+        return self.settings.hide_truth
+
+    @property
+    def is_rehearsal(self) -> bool:
+        """Whether this is a preview with a system that is not on the board."""
+        return any(system.rehearsed for system in self.systems)
 
     @property
     def video_ids(self) -> tuple[str, ...]:

@@ -1,9 +1,6 @@
 """The leaderboard and the index of videos."""
 
-import csv
-import io
-import json
-from collections.abc import Sequence
+from dataclasses import replace
 
 from pipeline.scores import VideoScore
 from sitegen.contexts import (
@@ -13,66 +10,115 @@ from sitegen.contexts import (
     HeatCell,
     HeatRow,
     LeaderboardPage,
+    Link,
     Shell,
     VideoCard,
     VideosPage,
 )
-from sitegen.gathered import SiteData, System
-from sitegen.numerals import Score, percent, plural, rate, score, seconds
-from sitegen.verdicts import title_of, verdict
+from sitegen.gathered import PUBLISHED, SiteData, System
+from sitegen.numerals import Score, percent, plural, score, seconds
+from sitegen.verdicts import (
+    first_share,
+    ledger_line,
+    measure,
+    rank_text,
+    ranks_text,
+    rate_measure,
+    title_of,
+    verdict,
+)
 from sitegen.words import visible
 
 BINS = 5
+SHOWN_ENTRIES = 20
 
 
-def leaderboard_page(data: SiteData, shell: Shell, chart_data: str) -> LeaderboardPage:
+def leaderboard_page(
+    data: SiteData, shell: Shell, chart_data: str, downloads: tuple[Link, ...], ledger_file: str
+) -> LeaderboardPage:
     """index.html"""
-    ranks = [system.rank for system in data.systems]
     signatures = tuple(dict.fromkeys(str(system.evaluation.card.signature) for system in data.systems))
-    hazards = sum(not hazard.is_no_hazard for rows in data.truth.values() for hazard in rows)
-    empty = sum(all(hazard.is_no_hazard for hazard in rows) for rows in data.truth.values())
+    entries = data.ledger[-SHOWN_ENTRIES:]
     return LeaderboardPage(
         shell=shell,
-        facts=(
-            Fact("videos", f"{len(data.truth):,}"),
-            Fact("described hazards", f"{hazards:,}"),
-            Fact("without a hazard", f"{empty:,}"),
-            Fact("submissions", f"{len(data.systems):,}"),
-        ),
+        facts=_facts(data),
         paragraphs=tuple(visible(part) for part in data.settings.description.split("\n\n") if part.strip()),
-        rows=tuple(_row(system, ranks) for system in data.systems),
+        hidden=data.hidden,
+        rows=tuple(_row(data, system) for system in data.systems),
         signatures=signatures,
         threshold=f"{data.settings.threshold:.2f}",
+        downloads=downloads,
+        published=(
+            Fact("System", PUBLISHED.system),
+            Fact("BESM", f"{PUBLISHED.besm:.4f}"),
+            Fact("SAM", f"{PUBLISHED.sam:.4f}"),
+            Fact("Videos", str(PUBLISHED.n_videos)),
+            Fact("Threshold", f"{PUBLISHED.threshold:.2f}"),
+        ),
+        ledger=tuple(ledger_line(data, entry) for entry in reversed(entries)),
+        ledger_summary=_ledger_summary(data),
+        ledger_file=ledger_file,
         charts=_charts(data) if data.systems else (),
         chart_data=chart_data if data.systems else "",
-        heat=tuple(_heat_row(data, system) for system in data.systems),
+        heat=() if data.hidden else tuple(_heat_row(data, system) for system in data.systems),
         cards=cards(data),
     )
 
 
 def videos_page(data: SiteData, shell: Shell) -> VideosPage:
     """videos.html"""
-    return VideosPage(shell, cards(data), plural(len(data.truth), "video"), f"{data.settings.threshold:.2f}")
+    summary, threshold = plural(len(data.truth), "video"), f"{data.settings.threshold:.2f}"
+    return VideosPage(shell, data.hidden, cards(data), summary, threshold)
 
 
-def _row(system: System, ranks: Sequence[int]) -> BoardRow:
-    card, submission = system.evaluation.card, system.evaluation.submission
-    name, authors, agents = visible(system.name), visible(submission.authors), visible(system.agents)
-    return BoardRow(
-        system.rank,
-        f"{system.rank}=" if ranks.count(system.rank) > 1 else str(system.rank),
-        system.slug,
-        name,
-        authors,
-        agents,
-        system.is_baseline,
-        score(card.besm),
-        score(card.sam),
-        rate(card.detection_rate),
-        None if card.hazard_recall is None else rate(card.hazard_recall),
-        visible(submission.date),
-        f"{name} {authors} {agents}".casefold(),
+def _facts(data: SiteData) -> tuple[Fact, ...]:
+    videos = Fact("videos", f"{len(data.truth):,}")
+    submissions = Fact("submissions", f"{sum(not system.rehearsed for system in data.systems):,}")
+    if data.hidden:
+        return videos, submissions
+    hazards = sum(not hazard.is_no_hazard for rows in data.truth.values() for hazard in rows)
+    empty = sum(all(hazard.is_no_hazard for hazard in rows) for rows in data.truth.values())
+    return (
+        videos,
+        Fact("described hazards", f"{hazards:,}"),
+        Fact("without a hazard", f"{empty:,}"),
+        submissions,
     )
+
+
+def _row(data: SiteData, system: System) -> BoardRow:
+    card, submission, sure = system.evaluation.card, system.evaluation.submission, system.uncertainty
+    name, authors, agents = visible(system.name), visible(submission.authors), visible(system.agents)
+    flagged = sum(probe.flagged for probe in system.probes)
+    recall = None
+    if card.hazard_recall is not None and sure.hazard_recall is not None:
+        recall = rate_measure(card.hazard_recall, sure.hazard_recall)
+    return BoardRow(
+        place=system.place,
+        rank_text=rank_text(data, system),
+        ranks=ranks_text(system),
+        first=first_share(system),
+        slug=system.slug,
+        name=name,
+        authors=authors,
+        agents=agents,
+        is_baseline=system.is_baseline,
+        is_rehearsed=system.rehearsed,
+        flags=plural(flagged, "probe speaks", "probes speak") if flagged else "",
+        besm=measure(card.besm, sure.besm),
+        sam=measure(card.sam, sure.sam),
+        detection=rate_measure(card.detection_rate, sure.detection_rate),
+        recall=recall,
+        date=visible(submission.date),
+        key=f"{name} {authors} {agents}".casefold(),
+    )
+
+
+def _ledger_summary(data: SiteData) -> str:
+    shown, there = min(len(data.ledger), SHOWN_ENTRIES), len(data.ledger)
+    if shown < there:
+        return f"The last {shown} of {plural(there, 'entry', 'entries')}, newest first."
+    return f"{plural(there, 'entry', 'entries')}, newest first."
 
 
 def video_href(data: SiteData, video_id: str) -> str:
@@ -104,7 +150,7 @@ def _charts(data: SiteData) -> tuple[Chart, ...]:
         "BESM against SAM",
         f"{visible(systems[0].name)} leads with BESM {best.besm:.4f} and SAM {best.sam:.4f}. "
         f"The two metrics differ by at most {apart:.4f} for any system; they can differ only in videos "
-        "with three captions or more.",
+        "with three captions or more. The thin lines are the 95 % intervals.",
         ("Submission", "BESM", "SAM", "Detection rate"),
         tuple(
             (
@@ -116,6 +162,8 @@ def _charts(data: SiteData) -> tuple[Chart, ...]:
             for s in systems
         ),
     )
+    if data.hidden:
+        return (both,)
     head = systems[0]
     passed = sum(video.detected for video in head.evaluation.videos)
     spread = Chart(
@@ -143,7 +191,33 @@ def cards(data: SiteData) -> tuple[VideoCard, ...]:
 
 
 def _card(data: SiteData, video_id: str) -> VideoCard:
-    media, truth = data.media[video_id], data.truth[video_id]
+    media = data.media[video_id]
+    length = seconds(media.frame_count / media.fps_hz) if media.fps_hz else ""
+    shape = (media.height_px / media.width_px) if media.width_px else 9 / 16
+    width = min(400, media.width_px or 400)
+    shown = visible(video_id)
+    card = VideoCard(
+        video_id="",
+        href=video_href(data, video_id),
+        picture=media.card,
+        picture_width=width,
+        picture_height=round(width * shape),
+        alt=f"A keyframe of {shown}",
+        labels=shown,
+        descriptions=(),
+        best=None,
+        best_by="",
+        found_by="",
+        state="",
+        length=length,
+        key=shown.casefold(),
+    )
+    return card if data.hidden else _judged_card(data, video_id, card)
+
+
+def _judged_card(data: SiteData, video_id: str, card: VideoCard) -> VideoCard:
+    """The card with the truth and how many systems met it."""
+    truth = data.truth[video_id]
     hazards = [hazard for hazard in truth if not hazard.is_no_hazard]
     ranked = sorted(data.systems, key=lambda system: -system.scores[video_id].best)
     best: Score | None = None
@@ -157,90 +231,16 @@ def _card(data: SiteData, video_id: str) -> VideoCard:
     else:
         state = "missed" if not found else "found" if found == len(data.systems) else "partly"
         words = f"{found} of {len(data.systems)} detected it"
-    length = seconds(media.frame_count / media.fps_hz) if media.fps_hz else ""
-    shape = (media.height_px / media.width_px) if media.width_px else 9 / 16
-    width = min(400, media.width_px or 400)
     descriptions = tuple(visible(hazard.description) for hazard in hazards)
-    return VideoCard(
-        visible(video_id),
-        video_href(data, video_id),
-        media.card,
-        width,
-        round(width * shape),
-        f"A keyframe of {visible(video_id)}: {labels}",
-        labels,
-        descriptions or ("Nothing to report: silence is right here.",),
-        best,
-        visible(ranked[0].name) if ranked else "",
-        words if data.systems else "",
-        state,
-        length,
-        " ".join([visible(video_id), labels, *descriptions]).casefold(),
+    return replace(
+        card,
+        video_id=card.labels,
+        alt=f"{card.alt}: {labels}",
+        labels=labels,
+        descriptions=descriptions or ("Nothing to report: silence is right here.",),
+        best=best,
+        best_by=visible(ranked[0].name) if ranked else "",
+        found_by=words if data.systems else "",
+        state=state,
+        key=" ".join([card.labels, labels, *descriptions]).casefold(),
     )
-
-
-_COLUMNS = (
-    "rank",
-    "submission",
-    "authors",
-    "agents",
-    "besm",
-    "sam",
-    "detection_rate",
-    "hazard_recall",
-    "n_videos",
-    "date",
-    "url",
-    "signature",
-)
-
-
-def _table(data: SiteData) -> list[dict[str, str | int | float | None]]:
-    rows: list[dict[str, str | int | float | None]] = []
-    for system in data.systems:
-        card, submission = system.evaluation.card, system.evaluation.submission
-        values = (
-            system.rank,
-            submission.name,
-            submission.authors,
-            system.agents,
-            card.besm,
-            card.sam,
-            card.detection_rate,
-            card.hazard_recall,
-            card.n_videos,
-            submission.date,
-            submission.url,
-            str(card.signature),
-        )
-        rows.append(dict(zip(_COLUMNS, values, strict=True)))
-    return rows
-
-
-def board_json(data: SiteData) -> bytes:
-    """The board as JSON: an object with `benchmark`, `threshold` and `rows`; texts as they were given."""
-    board = {
-        "benchmark": data.settings.name,
-        "threshold": data.settings.threshold,
-        "rows": _table(data),
-    }
-    return (json.dumps(board, ensure_ascii=True, indent=1, allow_nan=False) + "\n").encode()
-
-
-def board_csv(data: SiteData) -> bytes:
-    """The board as CSV in UTF-8; a text that a spreadsheet would run as a formula starts with `'`."""
-    out = io.StringIO()
-    writer = csv.DictWriter(out, _COLUMNS, lineterminator="\r\n")
-    writer.writeheader()
-    for row in _table(data):
-        writer.writerow({name: _cell(value) for name, value in row.items()})
-    return out.getvalue().encode()
-
-
-def _cell(value: str | int | float | None) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, str):
-        text = visible(value)
-        return f"'{text}" if text.lstrip()[:1] in {"=", "+", "-", "@"} else text
-    return f"{value:.6f}" if isinstance(value, float) else str(value)

@@ -4,6 +4,7 @@ from pipeline.prompts import templates
 from sitegen.blocks import blocks
 from sitegen.contexts import MethodPage, ModelView, PromptView, Shell
 from sitegen.gathered import SiteData
+from sitegen.judgements import agreement_table
 from sitegen.words import visible
 
 MODELS = (
@@ -41,6 +42,18 @@ find . -type f ! -name '.*' | sed 's|^./||' | while read -r f; do
   echo "${hash%% *}  $f"
 done | LC_ALL=C sort | sha256sum"""
 
+PROBES = {
+    "constant": ("Constant caption", "Of the videos with captions, how many get the most common one"),
+    "word-bag": ("Bag of common words", "How many captions string common words together without a sentence"),
+    "shuffled": ("Shuffled videos", "How much of BESM is left when every video has the captions of others"),
+    "stuffing": ("Many captions a video", "How many captions a video with captions has on average"),
+    "near-copy": ("Near copy", "In how many videos another submission has the same captions, or nearly"),
+    "truth-copy": (
+        "The truth's own words",
+        "How many hazards are described in exactly the words of the truth",
+    ),
+}
+
 SIGNATURE_PARTS = (
     ("coooler", "version of the metric's definition"),
     ("emb", "the embedding model and the hash of its weights and tokenizer"),
@@ -67,13 +80,22 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
     cut = short[0] + 1 if short else len(attribution)
     return MethodPage(
         shell,
+        data.hidden,
         f"{data.settings.threshold:.2f}",
         signature,
+        _probes(data),
         SIGNATURE_PARTS,
         prompts,
         MODELS,
         systems,
         attribution[:cut],
         attribution[cut:],
+        agreement_table(data.votes, {system.slug: system.evaluation for system in data.systems}),
         VERIFY,
     )
+
+
+def _probes(data: SiteData) -> tuple[tuple[str, str, str], ...]:
+    """Each probe's name, what it measures, and from where on it speaks."""
+    thresholds = {probe.kind: probe.threshold_text for system in data.systems for probe in system.probes}
+    return tuple((name, meaning, thresholds.get(kind, "–")) for kind, (name, meaning) in PROBES.items())

@@ -1,9 +1,10 @@
 """The page of one video: its pictures, its truth, and every system's words against it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.records import Kind, TrackBox, TruthHazard
+from pipeline.scores import VideoScore
 from sitegen.contexts import Fact, Link, Shell
 from sitegen.gathered import KeyframePicture, SiteData, System, VideoMedia
 from sitegen.numerals import number, plural, score, seconds
@@ -14,6 +15,7 @@ from sitegen.video_contexts import (
     FilmFrame,
     MatrixRow,
     OverlayBox,
+    Result,
     SystemView,
     Transcript,
     TruthView,
@@ -42,7 +44,7 @@ def video_page(
     truth = data.truth[video_id]
     media = data.media[video_id]
     boxes = data.boxes.get(video_id, ())
-    frames = film(media, boxes)
+    frames = film(media, boxes, hidden=data.hidden)
     hazards = [hazard for hazard in truth if not hazard.is_no_hazard]
     truth_views = tuple(_truth_view(hazard) for hazard in hazards)
     recorded = {made.slug for made in transcripts}
@@ -50,8 +52,9 @@ def video_page(
     return VideoPage(
         shell=shell,
         video_id=visible(video_id),
-        heading=visible(title_of(truth)),
-        facts=_facts(media, boxes),
+        hidden=data.hidden,
+        heading=visible(video_id if data.hidden else title_of(truth)),
+        facts=_facts(data, media, boxes),
         truth=truth_views,
         problem=visible(media.problem),
         note=visible(media.note),
@@ -76,15 +79,16 @@ def video_page(
     )
 
 
-def film(media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[FilmFrame, ...]:
-    """The film strip: every keyframe with its boxes."""
+def film(media: VideoMedia, boxes: Sequence[TrackBox], *, hidden: bool = False) -> tuple[FilmFrame, ...]:
+    """The film strip: every keyframe with its boxes; when the truth is hidden, without a word on boxes."""
     by_frame: dict[int, list[TrackBox]] = {}
     for box in boxes:
         by_frame.setdefault(box.frame_index, []).append(box)
-    return tuple(
+    frames = tuple(
         _film_frame(media, place, picture, by_frame.get(picture.index, []))
         for place, picture in enumerate(media.frames)
     )
+    return tuple(replace(frame, alt=_when(frame.index, frame.time)) for frame in frames) if hidden else frames
 
 
 def _film_frame(
@@ -94,7 +98,7 @@ def _film_frame(
     others = len(boxes) - hazards
     parts = [plural(hazards, "hazard box", "hazard boxes")] if hazards else []
     parts += [plural(others, "traffic box", "traffic boxes")] if others else []
-    alt = f"Frame {picture.index} at {seconds(picture.time_s)}: {' and '.join(parts) or 'no boxes'}"
+    alt = f"{_when(picture.index, seconds(picture.time_s))}: {' and '.join(parts) or 'no boxes'}"
     # Hazards last, so that they are drawn on top.
     ordered = sorted(boxes, key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id))
     return FilmFrame(
@@ -107,6 +111,10 @@ def _film_frame(
         tuple(_overlay(box, media) for box in ordered),
         place == media.cover,
     )
+
+
+def _when(index: int, time: str) -> str:
+    return f"Frame {index} at {time}"
 
 
 def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:
@@ -130,7 +138,7 @@ def _label_px(media: VideoMedia) -> float:
     return max(media.width_px / 45, 8.0)
 
 
-def _facts(media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[Fact, ...]:
+def _facts(data: SiteData, media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[Fact, ...]:
     tracks = {box.track_id: box.kind for box in boxes}
     hazards = sum(kind is Kind.CHALLENGE for kind in tracks.values())
     facts = []
@@ -141,11 +149,10 @@ def _facts(media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[Fact, ...]:
             Fact("Frames", f"{media.frame_count:,} at {media.fps_hz:g} per second"),
             Fact("Size", f"{media.width_px} × {media.height_px} px"),
         ]
-    return (
-        *facts,
-        Fact("Keyframes", str(len(media.frames))),
-        Fact("Tracks on them", f"{hazards} hazard, {len(tracks) - hazards} traffic"),
-    )
+    facts.append(Fact("Keyframes", str(len(media.frames))))
+    if not data.hidden:
+        facts.append(Fact("Tracks on them", f"{hazards} hazard, {len(tracks) - hazards} traffic"))
+    return tuple(facts)
 
 
 def _truth_view(hazard: TruthHazard) -> TruthView:
@@ -198,7 +205,6 @@ def _crops(data: SiteData, video_id: str, media: VideoMedia) -> tuple[CropView, 
 
 
 def _system_view(data: SiteData, system: System, video_id: str, hazards: Sequence[TruthHazard]) -> SystemView:
-    video = system.scores[video_id]
     best = best_pairs(system, video_id)
     words = {hazard.hazard_id: hazard.description for hazard in hazards}
     captions = []
@@ -213,24 +219,29 @@ def _system_view(data: SiteData, system: System, video_id: str, hazards: Sequenc
                 ", ".join(visible(track) for track in row.track_ids),
                 visible(pair.hazard_id) if pair else "",
                 cosine_score(pair, data.settings.threshold) if pair else None,
-                "" if pair else "The truth has no hazard here: a false alarm.",
+                "" if pair or data.hidden else "The truth has no hazard here: a false alarm.",
                 difference(visible(words[pair.hazard_id]), text) if pair else (),
             )
         )
-    kind, text = verdict(video)
-    empty = "This system described no hazard here, which is right." if not hazards else ""
+    empty = "This system said nothing here."
+    if not data.hidden:
+        right = "This system described no hazard here, which is right."
+        wrong = "This system described no hazard here; the video counts as 0 for it."
+        empty = wrong if hazards else right
     return SystemView(
         system.slug,
         visible(system.name),
         visible(system.agents),
         system.is_baseline,
-        score(video.besm),
-        score(video.sam),
-        kind,
-        text,
+        None if data.hidden else _result(system.scores[video_id]),
         tuple(captions),
-        empty or "This system described no hazard here; the video counts as 0 for it.",
+        empty,
     )
+
+
+def _result(video: VideoScore) -> Result:
+    kind, text = verdict(video)
+    return Result(score(video.besm), score(video.sam), kind, text)
 
 
 def _matrix(data: SiteData, video_id: str, hazards: Sequence[TruthHazard]) -> tuple[MatrixRow, ...]:

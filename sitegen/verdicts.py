@@ -1,13 +1,17 @@
-"""How a system did on a video, in a word, and the match that each caption is judged by."""
+"""How a system did, in words and numbers, and the match that each caption is judged by."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pipeline.records import TruthHazard
 from pipeline.scores import PairScore, VideoScore
-from sitegen.gathered import System
-from sitegen.numerals import Score, score
+from sitegen.contexts import LedgerLine, Measure
+from sitegen.gathered import SiteData, System
+from sitegen.ledger import Entry
+from sitegen.numerals import Score, percent, rate, score
 from sitegen.score import TOLERANCE
-from sitegen.words import shorten
+from sitegen.uncertainty import Interval
+from sitegen.words import shorten, visible
 
 NO_HAZARD = "No hazard"
 
@@ -42,3 +46,59 @@ def best_pairs(system: System, video_id: str) -> dict[int, PairScore]:
 def cosine_score(pair: PairScore, threshold: float) -> Score:
     """A pair's cosine, with the verdict that its similarity earns."""
     return score(pair.cosine, pair.similarity > threshold + TOLERANCE)
+
+
+def measure(value: float, interval: Interval) -> Measure:
+    """A mean of similarities in [0, 1] with its interval, to two digits."""
+    return _measure(score(value), interval, f"{interval.low:.2f}–{interval.high:.2f}")
+
+
+def rate_measure(value: float, interval: Interval) -> Measure:
+    """A share in [0, 1] with its interval, in whole percent."""
+    low, high = (f"{end * 100:.0f}" for end in (interval.low, interval.high))
+    return _measure(rate(value), interval, f"{low}–{high}\u202f%" if low != high else f"{low}\u202f%")
+
+
+def _measure(number: Score, interval: Interval, text: str) -> Measure:
+    low, high = (round(min(max(end, 0.0), 1.0) * 100) for end in (interval.low, interval.high))
+    return Measure(number, text, low, high)
+
+
+def rank_text(data: SiteData, system: System) -> str:
+    """The rank of a system's band; `=` says that others share it."""
+    shared = sum(other.rank == system.rank for other in data.systems) > 1
+    return f"{system.rank}=" if shared else str(system.rank)
+
+
+def first_share(system: System) -> Score:
+    """How often a system is first in the resamples, in whole percent."""
+    share = system.uncertainty.first_share
+    return replace(rate(share), text=f"{share * 100:.0f}\u202f%")
+
+
+def ranks_text(system: System) -> str:
+    """The ranks that a system takes in 95 % of the resamples."""
+    low, high = system.uncertainty.rank_low, system.uncertainty.rank_high
+    return f"{low} to {high}" if low < high else f"{low}"
+
+
+_EVENTS = {"add": "added", "replace": "replaced", "rescore": "rescored", "withdraw": "withdrawn"}
+
+
+def ledger_line(data: SiteData, entry: Entry) -> LedgerLine:
+    """A line of the ledger with the scores that it notes."""
+    scores = (("BESM", entry.besm), ("SAM", entry.sam))
+    parts = [f"{name} {value:.4f}" for name, value in scores if value is not None]
+    shares = (("detection", entry.detection_rate), ("hazard recall", entry.hazard_recall))
+    parts += [f"{name} {percent(value)}" for name, value in shares if value is not None]
+    on_board = any(system.slug == entry.slug for system in data.systems)
+    return LedgerLine(
+        date=visible(entry.date),
+        event=_EVENTS[entry.event],
+        name=visible(entry.name),
+        slug=entry.slug if on_board else "",
+        reason=visible(entry.reason),
+        sha256=visible(entry.predictions_sha256),
+        scores=", ".join(parts),
+        signature=visible(entry.signature),
+    )

@@ -74,17 +74,24 @@ class CaptionView:
 
 
 @dataclass(frozen=True, slots=True)
+class Result:
+    """How a system did on the video."""
+
+    besm: Score
+    sam: Score
+    verdict: str
+    verdict_text: str
+
+
+@dataclass(frozen=True, slots=True)
 class SystemView:
-    """All that one system said about the video."""
+    """All that one system said about the video; `result` is None when the truth is hidden."""
 
     slug: str
     name: str
     agents: str
     is_baseline: bool
-    besm: Score
-    sam: Score
-    verdict: str
-    verdict_text: str
+    result: Result | None
     captions: tuple[CaptionView, ...]
     empty_text: str
 
@@ -160,6 +167,7 @@ class VideoPage:
 
     shell: Shell
     video_id: str
+    hidden: bool
     heading: str
     facts: tuple[Fact, ...]
     truth: tuple[TruthView, ...]

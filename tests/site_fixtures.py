@@ -23,12 +23,17 @@ from pipeline.records import (
     StageOutput,
     TrackBox,
     TruthHazard,
+    UsageRow,
     VideoOutcome,
 )
-from pipeline.scores import Evaluation, Submission
-from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES, TRUTH
+from pipeline.scores import Submission
+from pipeline.tables import BOXES, MATCHES, OUTCOMES, PREDICTIONS, SNIPPETS, STAGES, TRUTH, USAGE
+from sitegen import ledger
 from sitegen.evaluate import evaluate, truth_sha256
+from sitegen.ledger import Entry
+from sitegen.probes import Probe
 from sitegen.readers import read_truth
+from sitegen.standings import Standing
 from sitegen.submissions import StoredSubmission
 from tests.clips import write_clip
 
@@ -41,7 +46,7 @@ EVIL = (
 FORMULA = '=HYPERLINK("http://evil.example/","x")'
 LONG = "w" * 2000
 
-Board = list[tuple[StoredSubmission, Evaluation]]
+Board = list[Standing]
 
 
 class WordEmbedder:
@@ -105,7 +110,10 @@ def truth_rows(clips: int) -> list[TruthHazard]:
 
 
 def make_board(benchmark: Benchmark) -> Board:
-    """Three submissions with their scores: one with records, one hostile, one that says nothing."""
+    """Three submissions with their scores: one with records, one hostile, one that says nothing.
+
+    The ledger holds them, and one that is not on the board any more.
+    """
     root = benchmark.root
     good = [
         Prediction("v1", 1, "A cat crossing the road", "cat", ("7",), (3, 4)),
@@ -120,12 +128,66 @@ def make_board(benchmark: Benchmark) -> Board:
     for folder in (good_folder, evil_folder):
         folder.mkdir(parents=True, exist_ok=True)
         _write_records(folder)
+    USAGE.write(
+        good_folder / "usage.parquet",
+        [
+            UsageRow("v1", "scene", "eyes", 25, 1_000, 200, 12.25, 0.5),
+            UsageRow("v1", "rhs", "words", 1, None, None, None, None),
+        ],
+    )
     truth = read_truth(benchmark.truth)
-    return [
+    board = [
         _entry(benchmark, truth, "Good system", good, "An embedded baseline", good_folder),
         _entry(benchmark, truth, FORMULA, evil, EVIL, evil_folder),
         _entry(benchmark, truth, "Silent", [], "", root / "submissions" / "silent"),
     ]
+    _write_ledger(root / "submissions", board)
+    entries = ledger.read(root / "submissions")
+    return [
+        one._replace(probes=probes(place), history=tuple(e for e in entries if e.slug == one.stored.slug))
+        for place, one in enumerate(board)
+    ]
+
+
+def probes(speaking: int) -> tuple[Probe, ...]:
+    """Six probes, of which the first few speak, and the last cannot be said."""
+    kinds = ("constant", "word-bag", "shuffled", "stuffing", "near-copy", "truth-copy")
+    return tuple(
+        Probe(
+            kind,
+            f"Probe {kind}",
+            None if place == 5 else 0.5,
+            "–" if place == 5 else "50\u202f%",
+            0.4,
+            "from 40\u202f%",
+            place < speaking,
+            f"A sentence <b>on</b> {kind}.",
+        )
+        for place, kind in enumerate(kinds)
+    )
+
+
+def _write_ledger(folder: Path, board: Board) -> None:
+    (folder / ledger.FILE_NAME).unlink(missing_ok=True)
+    entries = [
+        Entry(
+            event="add",
+            slug=one.stored.slug,
+            name=one.evaluation.submission.name,
+            date="2026-01-02",
+            predictions_sha256=one.stored.predictions_sha256,
+            original_sha256=one.stored.original_sha256,
+            signature=str(one.evaluation.card.signature),
+            besm=one.evaluation.card.besm,
+            sam=one.evaluation.card.sam,
+            detection_rate=one.evaluation.card.detection_rate,
+            hazard_recall=one.evaluation.card.hazard_recall,
+        )
+        for one in board
+    ]
+    gone = entries[0].model_copy(update={"slug": "gone", "name": "Gone", "date": "2026-01-03"})
+    why = {"event": "withdraw", "reason": f"It was {EVIL}", "date": "2026-01-04"}
+    ledger.append(folder, [*entries, gone, gone.model_copy(update=why)])
 
 
 def _entry(
@@ -135,7 +197,7 @@ def _entry(
     predictions: list[Prediction],
     agents: str,
     folder: Path,
-) -> tuple[StoredSubmission, Evaluation]:
+) -> Standing:
     folder.mkdir(parents=True, exist_ok=True)
     PREDICTIONS.write(folder / "predictions.parquet", predictions)
     digest = sha256_file(folder / "predictions.parquet")
@@ -143,11 +205,13 @@ def _entry(
     submission = Submission(
         name, "Some <authors>", "https://example.org/", "2026-01-02", "csv", tuple(predictions), warnings
     )
-    stored = StoredSubmission(slug(name), folder, submission, agents, digest, digest, "", ())
+    stored = StoredSubmission(
+        slug(name), folder, submission, agents, digest, digest, "", (), "MIT", f"A note, {EVIL}"
+    )
     evaluation = evaluate(
         submission, truth, WordEmbedder(), benchmark.settings.threshold, truth_sha256(truth)
     )
-    return stored, evaluation
+    return Standing(stored, evaluation)
 
 
 def _write_records(folder: Path) -> None:

@@ -25,6 +25,7 @@ PATHS = (
     "videos/zz-gone.html",
     "submissions/good-system.html",
     "method.html",
+    "submit.html",
 )
 
 

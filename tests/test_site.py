@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -12,12 +13,16 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from pipeline.benchmark import Benchmark
+from pipeline.errors import InputError
 from pipeline.records import Kind
 from sitegen import build as build_module
 from sitegen.build import build_site
 from sitegen.media import media_from_json, media_to_json
 from sitegen.output import MANIFEST
+from sitegen.uncertainty import uncertainties
 from tests.site_fixtures import BIDI, FORMULA, LONG, Board, make_benchmark, make_board
+
+SVG = "http://www.w3.org/2000/svg"  # a name that scripts need for SVG elements; nothing is loaded from it
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +122,8 @@ def test_stale_files_go_and_foreign_files_stay(
     (out / MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
     board = [entry for entry in small[1] if entry[0].slug != "silent"]
     report = build_site(small[0], out, board)
-    assert report.removed == 1
+    assert report.removed >= 1
+    assert not [path for path in out.rglob("*") if "silent" in path.name]
     assert not (out / "submissions" / "silent.html").exists()
     assert (out / ".gitignore").exists() and (out / "videos" / "mine.html").exists() and outside.exists()
 
@@ -180,7 +186,7 @@ def test_nothing_but_plotly_names_other_hosts(site: Path) -> None:
     """Styles and scripts of ours load nothing; plotly is kept in by the policy and the browser tests."""
     for path in (site / "assets").glob("*"):
         if path.name not in {"plotly.min.js", "icon.svg"}:
-            text = path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8").replace(SVG, "")
             assert not re.search(r"https?:|//cdn|@import|url\(|fetch\(|XMLHttpRequest", text), path
 
 
@@ -201,11 +207,70 @@ def test_hostile_text_stays_text(site: Path) -> None:
 def test_downloads(site: Path) -> None:
     with (site / "data" / "leaderboard.csv").open(encoding="utf-8", newline="") as source:
         rows = list(csv.DictReader(source))
-    assert [row["rank"] for row in rows] == ["1", "2", "2"]  # a tie shares its rank
+    assert [row["rank"] for row in rows] == ["1", "1", "1"]  # over four videos nobody is told apart
+    assert [row["place"] for row in rows] == ["1", "2", "3"]
     assert {row["submission"] for row in rows} == {"Good system", "'" + FORMULA, "Silent"}
     board = json.loads((site / "data" / "leaderboard.json").read_text(encoding="utf-8"))
     assert board["threshold"] == 0.8 and {row["submission"] for row in board["rows"]} >= {FORMULA}
     assert all(row["signature"].startswith("coooler:") for row in board["rows"])
+
+
+def test_uncertainty_and_probes_are_shown(small: tuple[Benchmark, Board], site: Path) -> None:
+    board = Tags((site / "index.html").read_text(encoding="utf-8"))
+    sure = uncertainties([standing.evaluation for standing in small[1]])
+    for one in sure:
+        assert f"{one.besm.low:.2f}–{one.besm.high:.2f}" in board.text
+        assert f"{one.rank_low} to {one.rank_high}first in {one.first_share * 100:.0f}\u202f%" in board.text
+    low, high = round(sure[0].besm.low * 100), round(sure[0].besm.high * 100)
+    drawn = {attrs["d"] for tag, attrs in board.tags if tag == "path" and attrs.get("class") == "bar-range"}
+    assert f"M{low} 3H{high}M{low} 0V6M{high} 0V6" in drawn
+    flags = [attrs["href"] for tag, attrs in board.tags if attrs.get("class") == "flag"]
+    assert flags == [f"submissions/{small[1][1].stored.slug}.html#probes", "submissions/silent.html#probes"]
+    assert "1 probe speaks" in board.text and "2 probes speak" in board.text
+    page = Tags((site / "submissions" / "silent.html").read_text(encoding="utf-8"))
+    assert "2 probes speak." in page.text and "A sentence <b>on</b> word-bag." in page.text
+    assert page.text.count("quiet") == 3 and page.text.count("speaks") == 2
+    assert page.text.count("cannot be said") == 1
+    assert f"{sure[2].besm.low:.4f} to {sure[2].besm.high:.4f}" in page.text
+    assert "Rank 1, shared with 2 others" in page.text and "By BESM alone it is number 3" in page.text
+
+
+def test_provenance(site: Path) -> None:
+    text = Tags((site / "submissions" / "good-system.html").read_text(encoding="utf-8")).text
+    for words in ("MIT", "A note, </script>", "26 calls of eyes, words", "at least 1,000 tokens in"):
+        assert words in text
+    assert "at least 12.2 seconds" in text and "BESM 0.4107, SAM 0.4405, detection 50.0" in text
+    assert text.count("coooler:1|emb:words") == 2  # its signature now, and that of its ledger line
+
+
+def test_the_ledger_is_shown_and_offered(small: tuple[Benchmark, Board], site: Path, tmp_path: Path) -> None:
+    stored = (small[0].submissions / "ledger.jsonl").read_bytes()
+    assert (site / "data" / "ledger.jsonl").read_bytes() == stored
+    page = Tags((site / "index.html").read_text(encoding="utf-8"))
+    assert "5 entries, newest first" in page.text and "withdrawn" in page.text and "Gone" in page.text
+    build_site(small[0], tmp_path, small[1], as_of="2026-01-02")
+    text = Tags((tmp_path / "index.html").read_text(encoding="utf-8")).text
+    assert "3 entries, newest first" in text and "withdrawn" not in text
+    assert (tmp_path / "data" / "ledger.jsonl").read_bytes() == b"".join(stored.splitlines(True)[:3])
+
+
+def test_a_rehearsal_is_marked_and_offers_no_board(small: tuple[Benchmark, Board], tmp_path: Path) -> None:
+    board = [small[1][0]._replace(rehearsed=True), *small[1][1:]]
+    build_site(small[0], tmp_path, board)
+    text = Tags((tmp_path / "index.html").read_text(encoding="utf-8")).text
+    assert text.count("Rehearsal, not on the board") == 1 and "Take it with you" not in text
+    page = (tmp_path / "submissions" / "good-system.html").read_text(encoding="utf-8")
+    assert "Rehearsal, not on the board" in page
+    assert not list((tmp_path / "data").glob("leaderboard.[!j]*"))
+    assert not (tmp_path / "data" / "leaderboard.json").exists()
+
+
+def test_signatures_are_never_mixed(small: tuple[Benchmark, Board], tmp_path: Path) -> None:
+    one, *others = small[1]
+    card = replace(one.evaluation.card, signature=replace(one.evaluation.card.signature, threshold=0.7))
+    board = [one._replace(evaluation=replace(one.evaluation, card=card)), *others]
+    with pytest.raises(InputError, match="signatures differ"):
+        build_site(small[0], tmp_path, board)
 
 
 def test_pages_read_without_scripts(site: Path) -> None:

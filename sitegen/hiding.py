@@ -1,0 +1,33 @@
+"""What the pages may know when the organiser keeps the truth back: nothing that a page could tell of it.
+
+A caption's cosine, a video's score and a verdict all tell of the truth. So do boxes and tracks: of those
+that are drawn or listed the hazards could only be left out, and the gap would point at them. Scores over
+all videos stay.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from pipeline.records import TruthHazard
+from pipeline.scores import Evaluation
+from sitegen.gathered import Records
+
+
+def videos_only(truth: Mapping[str, Sequence[TruthHazard]]) -> dict[str, tuple[TruthHazard, ...]]:
+    """The videos of the truth, each without a row, whether it has a hazard or none."""
+    return dict.fromkeys(truth, ())
+
+
+def totals_only(evaluation: Evaluation) -> Evaluation:
+    """The scorecard and the captions; no pair, no video's score, no track of a caption, no warning.
+
+    The check's warnings name videos with a hazard.
+    """
+    submission = evaluation.submission
+    captions = tuple(replace(row, track_ids=(), frame_indices=()) for row in submission.predictions)
+    return Evaluation(replace(submission, predictions=captions, warnings=()), (), (), evaluation.card)
+
+
+def words_only(records: Mapping[str, Records]) -> dict[str, Records]:
+    """What the stages said; not which tracks were looked at, since the hazards are among them."""
+    return {video_id: Records(stages=said.stages, outcome=said.outcome) for video_id, said in records.items()}
