@@ -42,7 +42,7 @@ _Hash = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 @dataclass(frozen=True, slots=True)
 class Sender:
-    """What the sender says of a submission; only the name must be there. `date` is the system's (ISO 8601)."""
+    """What the sender says of a submission; only the name is needed. `date` (ISO 8601) is the system's."""
 
     name: str
     authors: str = ""
