@@ -185,7 +185,8 @@ class DemoSubmission(Settings):
 class BenchmarkSettings(Settings):
     """The content of `coooler.toml`: what a benchmark folder holds. Paths are relative to it.
 
-    With `hide_truth` the site shows scores, but no truth text, hazard box, crop or cosine of a pair.
+    `address` is where the site will be seen, ending in a slash; pages name it as theirs. With
+    `hide_truth` the site shows scores, but no truth text, hazard box, crop or cosine of a pair.
     """
 
     name: str = Field(default="A COOOLER benchmark", min_length=1, max_length=120)
@@ -195,6 +196,7 @@ class BenchmarkSettings(Settings):
     boxes: str = "boxes.parquet"
     submissions: str = "submissions"
     site: str = "site"
+    address: str = Field(default="", pattern=r"^(https?://[^\s<>\"']+/)?$")
     attribution: str = ""
     show_videos: bool = True
     hide_truth: bool = False

@@ -186,7 +186,7 @@ def build_board(
             if rescore(benchmark.submissions, cards, today or FIRST_DAY):
                 board = _histories(benchmark, board)
         then = as_it_was(benchmark, as_of) if as_of else benchmark
-        report = build_site(then, out, board, bar, as_of=as_of)
+        report = build_site(then, out, board, bar, as_of=as_of, embedder=open_embedder())
     return board, report
 
 

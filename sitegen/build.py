@@ -3,7 +3,7 @@
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +13,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pipeline.benchmark import Benchmark
 from pipeline.errors import InputError, OutsideError
 from pipeline.files import sha256_of
+from pipeline.interfaces import Embedder
+from sitegen.blame import blame_board
 from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
-from sitegen.gathered import VideoMedia, path_names
+from sitegen.gathered import SiteData, VideoMedia, path_names
 from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json
 from sitegen.output import Output, open_output, stamped, tree_sha256
 from sitegen.pages import Page, data_files, make_pages
@@ -56,13 +58,15 @@ def build_site(
     settings: MediaSettings | None = None,
     jobs: int = 2,
     as_of: str = "",
+    embedder: Embedder | None = None,
 ) -> BuildReport:
     """Build the site of `benchmark` with the scored submissions of `board` in the folder `out`.
 
     The same inputs give the same bytes in every folder. Pictures of a video are made again only
     when its clip, its boxes or the settings changed. `as_of` is the day (ISO 8601) up to which the
-    ledger is shown. Raises InputError when the truth, the boxes, the records or the attribution cannot
-    be read, and when the truth is hidden but `out` holds what an unknown build left there.
+    ledger is shown. With an `embedder` it is worked out where hazards were lost. Raises InputError when
+    the truth, the boxes, the records or the attribution cannot be read, and when the truth is hidden
+    but `out` holds what an unknown build left there.
     """
     tell = _telling(bar)
     truth = read_truth_by_video(benchmark)
@@ -72,18 +76,34 @@ def build_site(
     todo = media_jobs(benchmark, names, boxes, settings or MediaSettings())
     media, remembered, decoded = _all_media(output, todo, jobs, tell)
     data = gather(benchmark, truth, boxes, media, board, as_of)
-
-    output.add_all(_assets(with_charts=bool(board)))
-    output.add_all(data_files(data))
-    pages = _rendered(make_pages(data), len(names) + len(board) + 6, tell)
-    blank = {path: sha256_of(page) for path, page in pages.items()}
-    digest = tree_sha256({**output.files, **blank})
-    output.add_all((path, stamped(page, digest)) for path, page in pages.items())
+    digest = put_pages(output, data, embedder, tell)
     removed = output.finish(remembered)
     if data.hidden:
         _nothing_left(output)
     size = sum(output.sizes.values())
     return BuildReport(out, output.written, output.unchanged, removed, decoded, digest, size)
+
+
+def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: Tell) -> str:
+    """Put all of a site but its pictures, which are there, into `output`; give the tree's hash."""
+    if embedder and not data.hidden:
+        data = _with_blame(data, embedder)
+    output.add_all(_assets(with_charts=bool(data.systems)))
+    output.add_all(data_files(data))
+    total = len(data.names) + len(data.systems) + 7
+    pages = _rendered(make_pages(data), data.settings.address, total, tell)
+    blank = {path: sha256_of(page) for path, page in pages.items()}
+    digest = tree_sha256({**output.files, **blank})
+    output.add_all((path, stamped(page, digest)) for path, page in pages.items())
+    return digest
+
+
+def _with_blame(data: SiteData, embedder: Embedder) -> SiteData:
+    """The data with what is known of where each system lost each hazard."""
+    truth = [hazard for video_id in data.video_ids for hazard in data.truth[video_id]]
+    blames = blame_board(data.systems, truth, embedder, data.settings.threshold)
+    systems = (replace(system, blame=blame) for system, blame in zip(data.systems, blames, strict=True))
+    return replace(data, systems=tuple(systems))
 
 
 def _telling(bar: "Progress | None") -> Tell:
@@ -125,14 +145,20 @@ def environment() -> Environment:
     )
 
 
-def _rendered(pages: Iterator[Page], total: int, tell: Tell) -> dict[str, bytes]:
-    """Path -> page with an empty place for the tree's hash. Raises ValueError for a path that comes twice."""
+def _rendered(pages: Iterator[Page], address: str, total: int, tell: Tell) -> dict[str, bytes]:
+    """Path -> page with an empty place for the tree's hash. Raises ValueError for a path that comes twice.
+
+    A page's canonical link is under `address`, where the site will be seen, or the page itself.
+    """
     env = environment()
     rendered: dict[str, bytes] = {}
     for done, page in enumerate(pages, start=1):
         if page.path in rendered:
             raise ValueError(f"{page.path}: two pages of one path")
-        text = env.get_template(page.template).render(page=page.context, shell=page.context.shell)
+        canonical = f"{address}{page.path}" if address else page.path.rpartition("/")[2]
+        text = env.get_template(page.template).render(
+            page=page.context, shell=page.context.shell, canonical=canonical
+        )
         rendered[page.path] = text.encode()
         tell("Rendering pages", done, total)
     return rendered

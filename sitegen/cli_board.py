@@ -152,6 +152,7 @@ def _rehearse(
     as_json: bool,
 ) -> None:
     from pipeline.files import linked_copy, write_text
+    from pipeline.minilm import open_embedder
     from sitegen.board import rehearse
     from sitegen.build import build_site
     from sitegen.rehearsal import markdown as as_markdown
@@ -164,7 +165,7 @@ def _rehearse(
     if not preview.exists() and (built / "index.html").is_file():
         linked_copy(built, preview)  # its pictures need not be made again
     with console.progress() as bar:
-        build_site(benchmark, preview, board, bar)
+        build_site(benchmark, preview, board, bar, embedder=open_embedder())
     page = preview / "submissions" / f"{board[place].stored.slug}.html"
     if markdown:
         write_text(markdown, as_markdown(told))
@@ -196,12 +197,17 @@ def withdraw(
 def build(
     out: OutOption = None,
     as_of: Annotated[str, typer.Option("--as-of", help="The board of this day, YYYY-MM-DD.")] = "",
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit 1 when the site breaks a budget or has a dead link.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Score all submissions and build the site; only what changed is written."""
     from datetime import date
 
+    from pipeline.errors import InputError
     from sitegen.board import build_board
+    from sitegen.strict import strict_faults
 
     try:
         day = date.fromisoformat(as_of).isoformat() if as_of else ""
@@ -210,6 +216,7 @@ def build(
     folder = out or Path("site")
     with console.progress() as bar:
         board, report = build_board(here(), folder, bar, as_of=day, today=today())
+    faults = strict_faults(folder) if strict else []
     rescored = [one.history[-1] for one in board if one.history and one.history[-1].event == "rescore"]
     if as_json:
         console.print_json(
@@ -221,8 +228,11 @@ def build(
                 "removed": report.removed,
                 "bytes": report.bytes,
                 "tree_sha256": report.tree_sha256,
+                "strict_faults": faults,
             }
         )
+        if faults:
+            raise InputError(f"{len(faults)} faults in the site.")
         return
     print_board([one.evaluation for one in board])
     for entry in rescored:
@@ -233,6 +243,10 @@ def build(
         markup=False,
         soft_wrap=True,
     )
+    if faults:
+        raise InputError(
+            "\n".join([f"{len(faults)} faults in the site:", *(f"  {fault}" for fault in faults)])
+        )
 
 
 def verify(

@@ -6,6 +6,7 @@ Paths are from the site's root; `Shell.root` leads there from the page ("" or ".
 from dataclasses import dataclass
 
 from sitegen.blocks import Block
+from sitegen.board_history import History
 from sitegen.judgements import AgreementTable
 from sitegen.numerals import Score
 
@@ -49,7 +50,7 @@ class BoardRow:
     """A row of the leaderboard; `key` holds what search looks through, in lower case.
 
     `place` is that of the score alone; `ranks` and `first` say how stable the rank is; `flags` says how
-    many probes speak, and is empty when none does.
+    many probes speak, and is empty when none does; `part` is the data file that tells more of the row.
     """
 
     place: int
@@ -69,6 +70,7 @@ class BoardRow:
     recall: Measure | None
     date: str
     key: str
+    part: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +154,11 @@ class Fact:
 
 @dataclass(frozen=True, slots=True)
 class LeaderboardPage:
-    """index.html"""
+    """index.html
+
+    `thresholds` are those that can be tried, empty when none can; `heat_left_out` and `cards_left_out`
+    say how many videos are not shown, and are empty when all are; `history` is None without a ledger.
+    """
 
     shell: Shell
     facts: tuple[Fact, ...]
@@ -170,6 +176,10 @@ class LeaderboardPage:
     chart_data: str
     heat: tuple[HeatRow, ...]
     cards: tuple[VideoCard, ...]
+    thresholds: tuple[str, ...]
+    heat_left_out: str
+    cards_left_out: str
+    history: History | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from pipeline.records import (
     VideoOutcome,
 )
 from pipeline.scores import Evaluation, PairScore, VideoScore
+from sitegen.failures import Blame
 from sitegen.judgements import Votes
 from sitegen.ledger import Entry
 from sitegen.probes import Probe
@@ -112,7 +113,8 @@ class System:
     `rank` counts from 1 and is shared by all that cannot be told apart; `place` is where its score
     alone puts it; `agents` says plainly who produced it; `facts` are provenance lines (name, value);
     `records` maps a video id to its records; `history` is what the ledger holds of it, oldest first;
-    `rehearsed` marks a preview, which is not on the board.
+    `rehearsed` marks a preview, which is not on the board; `blame` says where hazards were lost, when it
+    was worked out.
     """
 
     rank: int
@@ -131,6 +133,7 @@ class System:
     licence: str = ""
     notes: str = ""
     rehearsed: bool = False
+    blame: Blame | None = None
 
     @property
     def name(self) -> str:

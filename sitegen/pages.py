@@ -9,9 +9,12 @@ from sitegen import charts
 from sitegen.compare_files import compare_files
 from sitegen.contexts import LeaderboardPage, Link, MethodPage, Shell, SubmissionPage, VideosPage
 from sitegen.exports import FORMATS
+from sitegen.failure_files import failure_files
+from sitegen.failures import Blame
 from sitegen.gathered import SiteData, System
 from sitegen.page_board import leaderboard_page, video_href, videos_page
 from sitegen.page_compare import ComparePage, compare_page
+from sitegen.page_failures import FailuresPage, failures_page
 from sitegen.page_method import method_page
 from sitegen.page_submission import submission_page
 from sitegen.page_submit import SubmitPage, submit_files, submit_page
@@ -27,6 +30,7 @@ Context: TypeAlias = (
     | VideosPage
     | VideoPage
     | SubmissionPage
+    | FailuresPage
     | ComparePage
     | SubmitPage
     | VotePage
@@ -64,6 +68,9 @@ def make_pages(data: SiteData) -> Iterator[Page]:
         shell = _shell(data, visible(system.name), about, "../", "leaderboard")
         yield Page(f"submissions/{system.slug}.html", "submission.html", submission_page(data, system, shell))
     if not data.hidden:
+        about = "Every hazard that a system missed, where it was lost, and every wrong caption."
+        shell = _shell(data, "Failures", about, "", "failures")
+        yield Page("failures.html", "failures.html", failures_page(data, _blames(data), shell))
         about = "Two systems on the same videos: per-video differences, paired tests, who detects what."
         shell = _shell(data, "Compare", about, "", "compare")
         yield Page("compare.html", "compare.html", compare_page(data, shell))
@@ -108,6 +115,7 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
     yield from vote_files(data)
     if not data.hidden:
         yield from compare_files(data)
+        yield from failure_files(data, _blames(data))
     if not data.systems:
         return
     figures = {"besm-sam": charts.besm_against_sam([_point(system) for system in data.systems])}
@@ -117,6 +125,10 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
             data.settings.threshold,
         )
     yield BOARD_FIGURES, charts.data_file(figures)
+
+
+def _blames(data: SiteData) -> dict[str, Blame]:
+    return {system.slug: system.blame for system in data.systems if system.blame}
 
 
 def _point(system: System) -> charts.Point:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from pipeline.benchmark import Benchmark
 from pipeline.errors import InputError
 from pipeline.files import locked, sha256_file, sha256_of
+from pipeline.minilm import open_embedder
 from sitegen import about as about_file
 from sitegen import ledger, shelf
 from sitegen.board import evaluate_board
@@ -156,7 +157,7 @@ def _rebuilt(
 ) -> Iterator[str]:
     """Which files of the site are not what its inputs give now."""
     with tempfile.TemporaryDirectory() as scratch:
-        build_site(benchmark, Path(scratch), board, bar)
+        build_site(benchmark, Path(scratch), board, bar, embedder=open_embedder())
         before, after = _listing(site), _listing(Path(scratch))
     for name in sorted({*before, *after}):
         if name not in after:

@@ -1,0 +1,114 @@
+"""The film strip of a video's page: its keyframes, their boxes, and the tracks that can be switched."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from pipeline.records import Kind, TrackBox, TruthHazard
+from sitegen.gathered import KeyframePicture, VideoMedia
+from sitegen.numerals import number, plural, seconds
+from sitegen.video_contexts import FilmFrame, OverlayBox, TrackChip
+from sitegen.words import shorten, visible
+
+
+def film(
+    media: VideoMedia, boxes: Sequence[TrackBox], labels: Mapping[str, str], *, hidden: bool = False
+) -> tuple[FilmFrame, ...]:
+    """The film strip: every keyframe with its boxes; when the truth is hidden, without a word on boxes.
+
+    `labels` maps the track of a truth hazard to its label.
+    """
+    by_frame: dict[int, list[TrackBox]] = {}
+    for box in boxes:
+        by_frame.setdefault(box.frame_index, []).append(box)
+    frames = tuple(
+        _film_frame(media, place, picture, by_frame.get(picture.index, []), labels)
+        for place, picture in enumerate(media.frames)
+    )
+    return tuple(replace(frame, alt=_when(frame.index, frame.time)) for frame in frames) if hidden else frames
+
+
+def _film_frame(
+    media: VideoMedia,
+    place: int,
+    picture: KeyframePicture,
+    boxes: Sequence[TrackBox],
+    labels: Mapping[str, str],
+) -> FilmFrame:
+    # Hazards last, so that they are drawn on top.
+    ordered = sorted(boxes, key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id))
+    seen = dict.fromkeys(box.track_id for box in ordered if box.kind is Kind.CHALLENGE)
+    parts = [f"hazard track {named_track(track, labels)}" for track in seen]
+    others = sum(box.kind is not Kind.CHALLENGE for box in ordered)
+    parts += [plural(others, "traffic box", "traffic boxes")] if others else []
+    return FilmFrame(
+        place + 1,
+        picture.index,
+        seconds(picture.time_s),
+        picture.thumb,
+        picture.full,
+        f"{_when(picture.index, seconds(picture.time_s))}: {', '.join(parts) or 'no boxes'}",
+        tuple(_overlay(box, media) for box in ordered),
+        place == media.cover,
+    )
+
+
+def track_labels(hazards: Sequence[TruthHazard]) -> dict[str, str]:
+    """Track id -> the labels of the truth hazards that it is; no track without a label."""
+    found: dict[str, dict[str, None]] = {}
+    for hazard in hazards:
+        if hazard.track_id and hazard.label:
+            found.setdefault(hazard.track_id, {})[shorten(visible(hazard.label), 40)] = None
+    return {track: ", ".join(labels) for track, labels in found.items()}
+
+
+def named_track(track: str, labels: Mapping[str, str]) -> str:
+    """A track as texts name it, with its label where it has one."""
+    label = labels.get(track)
+    return shorten(visible(track), 24) + (f" ({label})" if label else "")
+
+
+def chips(boxes: Sequence[TrackBox], labels: Mapping[str, str]) -> tuple[TrackChip, ...]:
+    """The tracks of these boxes, hazards first; a track with boxes of both kinds is a hazard."""
+    hazards = {box.track_id for box in boxes if box.kind is Kind.CHALLENGE}
+    order = sorted({box.track_id for box in boxes}, key=lambda track: (track not in hazards, _by_size(track)))
+    return tuple(
+        TrackChip(visible(track), shorten(visible(track), 16), labels.get(track, ""), track in hazards)
+        for track in order
+    )
+
+
+def _by_size(track: str) -> tuple[int, str]:
+    """Sorts 9 before 10."""
+    return (len(track), track) if track.isdecimal() else (0, track)
+
+
+def tracks_text(tracks: Sequence[TrackChip]) -> str:
+    """How many tracks there are, by kind."""
+    hazards = sum(track.hazard for track in tracks)
+    return f"{hazards} hazard, {len(tracks) - hazards} traffic"
+
+
+def _when(index: int, time: str) -> str:
+    return f"Frame {index} at {time}"
+
+
+def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:
+    x1, x2 = (min(max(value, 0.0), float(media.width_px)) for value in (box.box.x1_px, box.box.x2_px))
+    y1, y2 = (min(max(value, 0.0), float(media.height_px)) for value in (box.box.y1_px, box.box.y2_px))
+    size = label_px(media)
+    text_y = y1 - size * 0.35 if y1 > size * 1.4 else y1 + size
+    return OverlayBox(
+        number(x1),
+        number(y1),
+        number(max(0.0, x2 - x1)),
+        number(max(0.0, y2 - y1)),
+        number(text_y),
+        visible(box.track_id),
+        shorten(visible(box.track_id), 16),
+        box.kind is Kind.CHALLENGE,
+    )
+
+
+def label_px(media: VideoMedia) -> float:
+    """Height of the track labels, in the video's pixels."""
+    return max(media.width_px / 45, 8.0)
