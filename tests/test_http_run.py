@@ -18,6 +18,7 @@ from pipeline.records import Stage
 from pipeline.run import RUN_TABLES, RunReport, find_videos, predict
 from pipeline.tables import BOXES, STAGES, USAGE
 from pipeline.team import NO_SERVICES, Services, close_connections, open_team
+from sitegen.about import Sender
 from sitegen.board import submit_file
 from tests.chat_server import Act, Body, http_config, say, serving, status
 
@@ -91,17 +92,12 @@ def test_a_recording_travels_with_a_submission(tmp_path: Path) -> None:
     assert export(Recording(recording), tmp_path / "answers.zip").count > 0
     (tmp_path / "coooler.toml").write_text("")
     (tmp_path / "truth.csv").write_bytes((DEMO / "truth.csv").read_bytes())
-    stored, _ = submit_file(
+    stored = submit_file(
         open_benchmark(tmp_path),
         tmp_path / "run",
-        "Mine",
-        "",
-        "",
-        "",
-        "2026-01-02",
-        replace=False,
+        Sender("Mine", date="2026-01-02"),
         recording=tmp_path / "answers.zip",
-    )
+    ).stored
     import_zip(stored.folder / "recording.zip", tmp_path / "elsewhere")
     services = Services(str(tmp_path / "elsewhere"), replay=True)
     again = Place(str(tmp_path / "again"))
@@ -112,12 +108,7 @@ def test_a_recording_travels_with_a_submission(tmp_path: Path) -> None:
         submit_file(
             open_benchmark(tmp_path),
             tmp_path / "run",
-            "Other",
-            "",
-            "",
-            "",
-            "2026-01-02",
-            replace=False,
+            Sender("Other", date="2026-01-02"),
             recording=tmp_path / "answers.zip",
         )
 
