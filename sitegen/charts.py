@@ -148,6 +148,44 @@ def score_distribution(systems: Sequence[tuple[str, Sequence[float]]], threshold
     }
 
 
+def means_by_group(
+    systems: Sequence[str], groups: Sequence[str], means: Sequence[Sequence[float]], threshold: float
+) -> Figure:
+    """A group of bars for each group of hazards; `means[system][group]` in [0, 1]."""
+    names = [label(name, 28) for name in groups]
+    traces = [
+        {
+            "type": "bar",
+            "x": names,
+            "y": [round(value, 4) for value in values],
+            "name": label(name),
+            "marker": {"color": _colour(place)},
+            "hovertemplate": "%{x}: %{y:.2f}<extra>" + label(name) + "</extra>",
+        }
+        for place, (name, values) in enumerate(zip(systems, means, strict=True))
+    ]
+    line = {
+        "type": "line",
+        "x0": 0,
+        "x1": 1,
+        "xref": "paper",
+        "y0": threshold,
+        "y1": threshold,
+        "line": {"color": "--ink", "width": 1, "dash": "dash"},
+    }
+    return {
+        "data": traces,
+        "layout": {
+            "barmode": "group",
+            "bargap": 0.25,
+            "xaxis": {"type": "category", "tickangle": "auto"},
+            "yaxis": {"title": {"text": "mean best similarity"}, "range": [0, 1]},
+            "shapes": [line],
+            "showlegend": True,
+        },
+    }
+
+
 def counts(values: Sequence[float]) -> list[int]:
     """Values in [0, 1] counted in 20 bins; 1 belongs to the last."""
     result = [0] * BINS

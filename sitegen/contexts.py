@@ -241,6 +241,16 @@ class Extreme:
 
 
 @dataclass(frozen=True, slots=True)
+class KindCount:
+    """How many failures of one kind a system has; `href` shows them in the gallery."""
+
+    name: str
+    count: int
+    href: str
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
 class SubmissionPage:
     """submissions/<slug>.html"""
 
@@ -255,6 +265,7 @@ class SubmissionPage:
     cards: tuple[Fact, ...]
     probes: tuple[ProbeLine, ...]
     probes_summary: str
+    failures: tuple[KindCount, ...]
     lines: tuple[VideoLine, ...]
     best: tuple[Extreme, ...]
     worst: tuple[Extreme, ...]
@@ -263,15 +274,6 @@ class SubmissionPage:
     warnings: tuple[str, ...]
     signature: str
     threshold: str
-
-
-@dataclass(frozen=True, slots=True)
-class ExampleRow:
-    """A caption of the worked example."""
-
-    caption: str
-    similarity: str
-    verdict: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,4 +313,6 @@ class MethodPage:
     attribution: tuple[Block, ...]
     attribution_rest: tuple[Block, ...]
     agreement: AgreementTable
+    mention_rule: str
+    failure_kinds: tuple[tuple[str, str], ...]
     verify: str

@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 from pipeline.scores import VideoScore
+from sitegen.board_files import parts, threshold_text, thresholds
+from sitegen.board_history import history
 from sitegen.contexts import (
     BoardRow,
     Chart,
@@ -17,6 +19,7 @@ from sitegen.contexts import (
 )
 from sitegen.gathered import PUBLISHED, SiteData, System
 from sitegen.numerals import Score, percent, plural, score, seconds
+from sitegen.spreads import spreads
 from sitegen.verdicts import (
     first_share,
     ledger_line,
@@ -31,6 +34,8 @@ from sitegen.words import visible
 
 BINS = 5
 SHOWN_ENTRIES = 20
+SHOWN_CARDS = 24
+HEAT_VIDEOS = 100
 
 
 def leaderboard_page(
@@ -39,14 +44,16 @@ def leaderboard_page(
     """index.html"""
     signatures = tuple(dict.fromkeys(str(system.evaluation.card.signature) for system in data.systems))
     entries = data.ledger[-SHOWN_ENTRIES:]
+    held = parts(data)
+    videos = len(data.truth)
     return LeaderboardPage(
         shell=shell,
         facts=_facts(data),
         paragraphs=tuple(visible(part) for part in data.settings.description.split("\n\n") if part.strip()),
         hidden=data.hidden,
-        rows=tuple(_row(data, system) for system in data.systems),
+        rows=tuple(_row(data, system, held[system.slug]) for system in data.systems),
         signatures=signatures,
-        threshold=f"{data.settings.threshold:.2f}",
+        threshold=threshold_text(data.settings.threshold),
         downloads=downloads,
         published=(
             Fact("System", PUBLISHED.system),
@@ -61,7 +68,11 @@ def leaderboard_page(
         charts=_charts(data) if data.systems else (),
         chart_data=chart_data if data.systems else "",
         heat=() if data.hidden else tuple(_heat_row(data, system) for system in data.systems),
-        cards=cards(data),
+        cards=cards(data, SHOWN_CARDS),
+        thresholds=tuple(map(threshold_text, thresholds(data))),
+        heat_left_out=f"{HEAT_VIDEOS} of {videos:,}" if videos > HEAT_VIDEOS else "",
+        cards_left_out=f"All {videos:,} videos" if videos > SHOWN_CARDS else "",
+        history=history(data.ledger),
     )
 
 
@@ -86,7 +97,7 @@ def _facts(data: SiteData) -> tuple[Fact, ...]:
     )
 
 
-def _row(data: SiteData, system: System) -> BoardRow:
+def _row(data: SiteData, system: System, part: int) -> BoardRow:
     card, submission, sure = system.evaluation.card, system.evaluation.submission, system.uncertainty
     name, authors, agents = visible(system.name), visible(submission.authors), visible(system.agents)
     flagged = sum(probe.flagged for probe in system.probes)
@@ -111,6 +122,7 @@ def _row(data: SiteData, system: System) -> BoardRow:
         recall=recall,
         date=visible(submission.date),
         key=f"{name} {authors} {agents}".casefold(),
+        part=part,
     )
 
 
@@ -128,7 +140,7 @@ def video_href(data: SiteData, video_id: str) -> str:
 
 def _heat_row(data: SiteData, system: System) -> HeatRow:
     cells = []
-    for video_id in data.video_ids:
+    for video_id in data.video_ids[:HEAT_VIDEOS]:
         video = system.scores[video_id]
         _, text = verdict(video)
         shown = score(video.besm, video.detected, digits=2)
@@ -175,7 +187,7 @@ def _charts(data: SiteData) -> tuple[Chart, ...]:
         ("Submission", *(f"{i / BINS:.1f}–{(i + 1) / BINS:.1f}" for i in range(BINS))),
         tuple((visible(s.name), *map(str, _coarse(s))) for s in systems),
     )
-    return both, spread
+    return both, spread, *(chart for chart, _ in spreads(data))
 
 
 def _coarse(system: System) -> list[int]:
@@ -185,9 +197,9 @@ def _coarse(system: System) -> list[int]:
     return counted
 
 
-def cards(data: SiteData) -> tuple[VideoCard, ...]:
-    """A card a video, in the order of their ids."""
-    return tuple(_card(data, video_id) for video_id in data.video_ids)
+def cards(data: SiteData, limit: int | None = None) -> tuple[VideoCard, ...]:
+    """A card a video, in the order of their ids; the first `limit` only, where one is given."""
+    return tuple(_card(data, video_id) for video_id in data.video_ids[:limit])
 
 
 def _card(data: SiteData, video_id: str) -> VideoCard:

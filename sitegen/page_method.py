@@ -3,8 +3,10 @@
 from pipeline.prompts import templates
 from sitegen.blocks import blocks
 from sitegen.contexts import MethodPage, ModelView, PromptView, Shell
+from sitegen.failures import NAMES, SENTENCES, FailureKind
 from sitegen.gathered import SiteData
 from sitegen.judgements import agreement_table
+from sitegen.mentions import RULE
 from sitegen.words import visible
 
 MODELS = (
@@ -91,6 +93,8 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
         attribution[:cut],
         attribution[cut:],
         agreement_table(data.votes, {system.slug: system.evaluation for system in data.systems}),
+        RULE,
+        tuple((NAMES[kind], SENTENCES[kind]) for kind in FailureKind),
         VERIFY,
     )
 

@@ -1,9 +1,11 @@
 """The page of one submission."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from pipeline.records import UsageRow
-from sitegen.contexts import Extreme, Fact, JudgedLine, ProbeLine, Shell, SubmissionPage, VideoLine
+from sitegen.contexts import Extreme, Fact, JudgedLine, KindCount, ProbeLine, Shell, SubmissionPage, VideoLine
+from sitegen.failures import NAMES, SENTENCES, FailureKind
 from sitegen.gathered import SiteData, System
 from sitegen.numerals import percent, plural, score
 from sitegen.probes import Probe
@@ -32,6 +34,7 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
         cards=_scorecard(data, system),
         probes=tuple(map(_probe_line, system.probes)),
         probes_summary=plural(flagged, "probe speaks", "probes speak") if flagged else "No probe speaks",
+        failures=_failures(system),
         lines=tuple(_line(data, system, video_id) for video_id in data.video_ids),
         best=best,
         worst=worst,
@@ -40,6 +43,17 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
         warnings=tuple(visible(warning) for warning in submission.warnings),
         signature=str(system.evaluation.card.signature),
         threshold=f"{data.settings.threshold:.2f}",
+    )
+
+
+def _failures(system: System) -> tuple[KindCount, ...]:
+    """How many failures of each kind there are; none where it was not worked out."""
+    counts = Counter(failure.kind for failure in system.blame.failures) if system.blame else Counter()
+    address = f"failures.html?system={system.slug}&kind="
+    return tuple(
+        KindCount(NAMES[kind], counts[kind], f"{address}{kind}", SENTENCES[kind])
+        for kind in FailureKind
+        if counts[kind]
     )
 
 

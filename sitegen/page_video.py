@@ -1,26 +1,30 @@
 """The page of one video: its pictures, its truth, and every system's words against it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+from operator import attrgetter
 
 from pipeline.records import Kind, TrackBox, TruthHazard
 from pipeline.scores import VideoScore
 from sitegen.contexts import Fact, Link, Shell
-from sitegen.gathered import KeyframePicture, SiteData, System, VideoMedia
-from sitegen.numerals import number, plural, score, seconds
+from sitegen.failures import NAMES, SENTENCES, Blame, Failure, FailureKind
+from sitegen.gathered import SiteData, System, VideoMedia
+from sitegen.numerals import number, score, seconds
 from sitegen.verdicts import best_pairs, cosine_score, title_of, verdict
 from sitegen.video_contexts import (
     CaptionView,
     CropView,
-    FilmFrame,
+    FailureView,
     MatrixRow,
-    OverlayBox,
     Result,
     SystemView,
     Transcript,
     TruthView,
     VideoPage,
 )
+from sitegen.video_film import chips, film, label_px, named_track, track_labels, tracks_text
 from sitegen.words import difference, shorten, visible
 
 
@@ -44,8 +48,10 @@ def video_page(
     truth = data.truth[video_id]
     media = data.media[video_id]
     boxes = data.boxes.get(video_id, ())
-    frames = film(media, boxes, hidden=data.hidden)
     hazards = [hazard for hazard in truth if not hazard.is_no_hazard]
+    labels = track_labels(hazards)
+    frames = film(media, boxes, labels, hidden=data.hidden)
+    tracks = chips(boxes, labels)
     truth_views = tuple(_truth_view(hazard) for hazard in hazards)
     recorded = {made.slug for made in transcripts}
     unrecorded = [visible(system.name) for system in data.systems if system.slug not in recorded]
@@ -63,84 +69,24 @@ def video_page(
         frames=frames,
         cover=frames[media.cover] if frames else None,
         clip=media.clip,
-        has_boxes=any(frame.boxes for frame in frames),
-        crops=_crops(data, video_id, media),
-        systems=tuple(_system_view(data, system, video_id, hazards) for system in data.systems),
+        tracks=tracks if any(frame.boxes for frame in frames) else (),
+        tracks_text=tracks_text(tracks),
+        crops=_crops(data, video_id, media, labels),
+        systems=tuple(_system_view(data, system, video_id, hazards, transcripts) for system in data.systems),
         matrix_columns=truth_views,
         matrix=_matrix(data, video_id, hazards),
         transcripts=tuple(transcripts),
         unrecorded=", ".join(unrecorded),
         threshold=f"{data.settings.threshold:.2f}",
         threshold_share=round(data.settings.threshold * 100),
-        label_px=number(_label_px(media)),
+        label_px=number(label_px(media)),
         previous=place.before,
         following=place.after,
         place=place.text,
     )
 
 
-def film(media: VideoMedia, boxes: Sequence[TrackBox], *, hidden: bool = False) -> tuple[FilmFrame, ...]:
-    """The film strip: every keyframe with its boxes; when the truth is hidden, without a word on boxes."""
-    by_frame: dict[int, list[TrackBox]] = {}
-    for box in boxes:
-        by_frame.setdefault(box.frame_index, []).append(box)
-    frames = tuple(
-        _film_frame(media, place, picture, by_frame.get(picture.index, []))
-        for place, picture in enumerate(media.frames)
-    )
-    return tuple(replace(frame, alt=_when(frame.index, frame.time)) for frame in frames) if hidden else frames
-
-
-def _film_frame(
-    media: VideoMedia, place: int, picture: KeyframePicture, boxes: Sequence[TrackBox]
-) -> FilmFrame:
-    hazards = sum(box.kind is Kind.CHALLENGE for box in boxes)
-    others = len(boxes) - hazards
-    parts = [plural(hazards, "hazard box", "hazard boxes")] if hazards else []
-    parts += [plural(others, "traffic box", "traffic boxes")] if others else []
-    alt = f"{_when(picture.index, seconds(picture.time_s))}: {' and '.join(parts) or 'no boxes'}"
-    # Hazards last, so that they are drawn on top.
-    ordered = sorted(boxes, key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id))
-    return FilmFrame(
-        place + 1,
-        picture.index,
-        seconds(picture.time_s),
-        picture.thumb,
-        picture.full,
-        alt,
-        tuple(_overlay(box, media) for box in ordered),
-        place == media.cover,
-    )
-
-
-def _when(index: int, time: str) -> str:
-    return f"Frame {index} at {time}"
-
-
-def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:
-    x1, x2 = (min(max(value, 0.0), float(media.width_px)) for value in (box.box.x1_px, box.box.x2_px))
-    y1, y2 = (min(max(value, 0.0), float(media.height_px)) for value in (box.box.y1_px, box.box.y2_px))
-    size = _label_px(media)
-    text_y = y1 - size * 0.35 if y1 > size * 1.4 else y1 + size
-    return OverlayBox(
-        number(x1),
-        number(y1),
-        number(max(0.0, x2 - x1)),
-        number(max(0.0, y2 - y1)),
-        number(text_y),
-        shorten(visible(box.track_id), 16),
-        box.kind is Kind.CHALLENGE,
-    )
-
-
-def _label_px(media: VideoMedia) -> float:
-    """Height of the track labels, in the video's pixels."""
-    return max(media.width_px / 45, 8.0)
-
-
 def _facts(data: SiteData, media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[Fact, ...]:
-    tracks = {box.track_id: box.kind for box in boxes}
-    hazards = sum(kind is Kind.CHALLENGE for kind in tracks.values())
     facts = []
     if media.frame_count:
         length = seconds(media.frame_count / media.fps_hz) if media.fps_hz else "unknown"
@@ -151,7 +97,7 @@ def _facts(data: SiteData, media: VideoMedia, boxes: Sequence[TrackBox]) -> tupl
         ]
     facts.append(Fact("Keyframes", str(len(media.frames))))
     if not data.hidden:
-        facts.append(Fact("Tracks on them", f"{hazards} hazard, {len(tracks) - hazards} traffic"))
+        facts.append(Fact("Tracks on them", tracks_text(chips(boxes, {}))))
     return tuple(facts)
 
 
@@ -166,7 +112,9 @@ def _truth_view(hazard: TruthHazard) -> TruthView:
     )
 
 
-def _crops(data: SiteData, video_id: str, media: VideoMedia) -> tuple[CropView, ...]:
+def _crops(
+    data: SiteData, video_id: str, media: VideoMedia, labels: Mapping[str, str]
+) -> tuple[CropView, ...]:
     """Crops of hazard tracks, and of those that a system's verification took for its hazard."""
     seen: dict[str, list[str]] = {}
     blamed: set[str] = set()
@@ -186,7 +134,7 @@ def _crops(data: SiteData, video_id: str, media: VideoMedia) -> tuple[CropView, 
         hazard = crop.kind is Kind.CHALLENGE
         if not hazard and crop.track_id not in blamed:
             continue
-        track = shorten(visible(crop.track_id), 24)
+        kind = "Hazard" if hazard else "Traffic"
         first = crop.track_id not in shown
         shown.add(crop.track_id)
         views.append(
@@ -194,23 +142,35 @@ def _crops(data: SiteData, video_id: str, media: VideoMedia) -> tuple[CropView, 
                 crop.path,
                 crop.picture_width_px,
                 crop.picture_height_px,
-                f"{'Hazard' if hazard else 'Traffic'} track {track}, cut from frame {crop.frame_index}",
-                track,
+                f"{kind} track {named_track(crop.track_id, labels)}, cut from frame {crop.frame_index}",
+                visible(crop.track_id),
+                shorten(visible(crop.track_id), 24),
                 hazard,
-                f"frame {crop.frame_index}, {crop.width_px} × {crop.height_px} px",
+                crop.frame_index,
+                f"{crop.width_px} × {crop.height_px} px",
                 tuple(seen.get(crop.track_id, ())) if first else (),
             )
         )
     return tuple(sorted(views, key=lambda view: not view.hazard))
 
 
-def _system_view(data: SiteData, system: System, video_id: str, hazards: Sequence[TruthHazard]) -> SystemView:
+def _system_view(
+    data: SiteData,
+    system: System,
+    video_id: str,
+    hazards: Sequence[TruthHazard],
+    transcripts: Sequence[Transcript],
+) -> SystemView:
+    blame = None if data.hidden else system.blame
+    failures = _failures(blame, video_id) if blame else []
+    wrong = {f.prediction_rank: f for f in failures if f.hazard_id is None}
     best = best_pairs(system, video_id)
     words = {hazard.hazard_id: hazard.description for hazard in hazards}
     captions = []
     for row in system.predictions.get(video_id, []):
         pair = best.get(row.rank)
         text = visible(row.description)
+        fault = wrong.get(row.rank)
         captions.append(
             CaptionView(
                 row.rank,
@@ -220,14 +180,16 @@ def _system_view(data: SiteData, system: System, video_id: str, hazards: Sequenc
                 visible(pair.hazard_id) if pair else "",
                 cosine_score(pair, data.settings.threshold) if pair else None,
                 "" if pair or data.hidden else "The truth has no hazard here: a false alarm.",
+                NAMES[fault.kind] if fault else "",
+                SENTENCES[fault.kind] if fault else "",
                 difference(visible(words[pair.hazard_id]), text) if pair else (),
             )
         )
     empty = "This system said nothing here."
     if not data.hidden:
         right = "This system described no hazard here, which is right."
-        wrong = "This system described no hazard here; the video counts as 0 for it."
-        empty = wrong if hazards else right
+        silent = "This system described no hazard here; the video counts as 0 for it."
+        empty = silent if hazards else right
     return SystemView(
         system.slug,
         visible(system.name),
@@ -236,7 +198,63 @@ def _system_view(data: SiteData, system: System, video_id: str, hazards: Sequenc
         None if data.hidden else _result(system.scores[video_id]),
         tuple(captions),
         empty,
+        _fates(system, video_id, hazards, failures, transcripts) if blame else (),
     )
+
+
+def _failures(blame: Blame, video_id: str) -> list[Failure]:
+    """The failures on this video; those of a system are sorted by video."""
+    key = attrgetter("video_id")
+    start = bisect_left(blame.failures, video_id, key=key)
+    return list(takewhile(lambda failure: key(failure) == video_id, blame.failures[start:]))
+
+
+def _fates(
+    system: System,
+    video_id: str,
+    hazards: Sequence[TruthHazard],
+    failures: Sequence[Failure],
+    transcripts: Sequence[Transcript],
+) -> tuple[FailureView, ...]:
+    lost = {failure.hazard_id: failure for failure in failures if failure.hazard_id is not None}
+    stages: dict[str, str] = {}
+    for made in transcripts:
+        if made.slug == system.slug:
+            stages = {stage.code: stage.name for stage in made.stages}
+            stages |= {"verify": "Verification"} if made.tracks_summary else {}
+    views = []
+    for hazard in hazards:
+        name = visible(hazard.label) or shorten(visible(hazard.description), 40)
+        similar = [p.similarity for p in system.pairs.get(video_id, ()) if p.hazard_id == hazard.hazard_id]
+        best = score(max(similar)).text if similar else ""
+        failure = lost.get(hazard.hazard_id)
+        if failure is None:
+            views.append(FailureView(name, True, best, "", "", "", ""))
+            continue
+        place, title = _where_lost(system.slug, failure, stages)
+        evidence = visible(failure.evidence)
+        views.append(FailureView(name, False, best, NAMES[failure.kind], evidence, place, title))
+    return tuple(views)
+
+
+_LOST_AT = {
+    FailureKind.NOT_SEEN: "scene",
+    FailureKind.NOT_RANKED: "rhs",
+    FailureKind.LOST_IN_MERGING: "cos",
+    FailureKind.NOT_ANOMALOUS: "aos",
+    FailureKind.TOO_SMALL: "verify",
+}
+"""The stage, by the code that its place on the page has, that shows a failure."""
+
+
+def _where_lost(slug: str, failure: Failure, stages: Mapping[str, str]) -> tuple[str, str]:
+    """The id and the name of the place on the page where a failure shows, or empty texts."""
+    code = _LOST_AT.get(failure.kind, "")
+    if code in stages:
+        return f"{slug}-{code}", stages[code]
+    if failure.prediction_rank is not None:
+        return f"{slug}-caption-{failure.prediction_rank}", f"Caption {failure.prediction_rank}"
+    return "", ""
 
 
 def _result(video: VideoScore) -> Result:

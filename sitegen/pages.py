@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 from pipeline import __version__
 from sitegen import charts
+from sitegen.board_files import board_files
 from sitegen.compare_files import compare_files
 from sitegen.contexts import LeaderboardPage, Link, MethodPage, Shell, SubmissionPage, VideosPage
 from sitegen.exports import FORMATS
@@ -20,6 +21,7 @@ from sitegen.page_submission import submission_page
 from sitegen.page_submit import SubmitPage, submit_files, submit_page
 from sitegen.page_video import Place, video_page
 from sitegen.page_vote import VotePage, vote_files, vote_page
+from sitegen.spreads import spreads
 from sitegen.transcript import transcript
 from sitegen.verdicts import title_of
 from sitegen.video_contexts import VideoPage
@@ -116,6 +118,7 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
     if not data.hidden:
         yield from compare_files(data)
         yield from failure_files(data, _blames(data))
+    yield from board_files(data)
     if not data.systems:
         return
     figures = {"besm-sam": charts.besm_against_sam([_point(system) for system in data.systems])}
@@ -124,6 +127,7 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
             [(s.name, [video.best for video in s.evaluation.videos]) for s in data.systems],
             data.settings.threshold,
         )
+        figures |= {chart.chart_id: figure for chart, figure in spreads(data)}
     yield BOARD_FIGURES, charts.data_file(figures)
 
 

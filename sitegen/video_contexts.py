@@ -10,7 +10,10 @@ from sitegen.words import Diff
 
 @dataclass(frozen=True, slots=True)
 class OverlayBox:
-    """A box in viewBox units (the video's pixels); texts are numbers for attributes."""
+    """A box in viewBox units (the video's pixels); texts are numbers for attributes.
+
+    `track` names its track, `label` is that name, cut to fit on the picture.
+    """
 
     x: str
     y: str
@@ -18,6 +21,17 @@ class OverlayBox:
     height: str
     text_y: str
     track: str
+    label: str
+    hazard: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TrackChip:
+    """A track on the keyframes that can be switched; `title` is the truth's label, or empty."""
+
+    track: str
+    label: str
+    title: str
     hazard: bool
 
 
@@ -44,8 +58,10 @@ class CropView:
     height: int
     alt: str
     track: str
+    label: str
     hazard: bool
-    detail: str
+    frame: int
+    size: str
     seen_as: tuple[str, ...]
 
 
@@ -61,7 +77,10 @@ class TruthView:
 
 @dataclass(frozen=True, slots=True)
 class CaptionView:
-    """A prediction, against the truth hazard it matches best."""
+    """A prediction, against the truth hazard it matches best.
+
+    `fault` names what is wrong with it as a caption (an extra hazard, a wrong object), `fault_text` says why.
+    """
 
     rank: int
     label: str
@@ -70,6 +89,8 @@ class CaptionView:
     hazard_id: str
     score: Score | None
     note: str
+    fault: str
+    fault_text: str
     diff: Diff
 
 
@@ -84,8 +105,29 @@ class Result:
 
 
 @dataclass(frozen=True, slots=True)
+class FailureView:
+    """What became of a truth hazard under a system.
+
+    `similarity` is its best, as text, and empty when there is none. `name` is empty when the hazard is found,
+    else how it failed, and `evidence` a sentence on that; `place` is the id on the page of what it speaks of,
+    and `place_name` its name; both may be empty.
+    """
+
+    hazard: str
+    found: bool
+    similarity: str
+    name: str
+    evidence: str
+    place: str
+    place_name: str
+
+
+@dataclass(frozen=True, slots=True)
 class SystemView:
-    """All that one system said about the video; `result` is None when the truth is hidden."""
+    """All that one system said about the video; `result` is None when the truth is hidden.
+
+    `fates` says what became of each truth hazard; it is empty where that was not looked into.
+    """
 
     slug: str
     name: str
@@ -94,6 +136,7 @@ class SystemView:
     result: Result | None
     captions: tuple[CaptionView, ...]
     empty_text: str
+    fates: tuple[FailureView, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +221,8 @@ class VideoPage:
     frames: tuple[FilmFrame, ...]
     cover: FilmFrame | None
     clip: str
-    has_boxes: bool
+    tracks: tuple[TrackChip, ...]
+    tracks_text: str
     crops: tuple[CropView, ...]
     systems: tuple[SystemView, ...]
     matrix_columns: tuple[TruthView, ...]

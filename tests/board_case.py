@@ -28,10 +28,14 @@ def entry(date: str, slug: str, besm: float | None, event: str = "add") -> Entry
 def site_data(n_videos: int = 130, n_systems: int = 5) -> SiteData:
     """Generated systems with a ledger of two days; in one of them a probe speaks."""
     data = board(n_videos, n_systems)
-    probe = Probe("stuffing", "Caption list", 7.0, "7 captions a video", 3.0, "3", True, "It says <b>a lot</b>.")
+    probe = Probe(
+        "stuffing", "Caption list", 7.0, "7 captions a video", 3.0, "3", True, "It says <b>a lot</b>."
+    )
     last = replace(data.systems[-1], probes=(probe,))
     cards = {system.slug: system.evaluation.card.besm for system in data.systems}
-    ledger = [entry(f"2026-01-0{2 + place % 2}", slug, besm) for place, (slug, besm) in enumerate(cards.items())]
+    ledger = [
+        entry(f"2026-01-0{2 + place % 2}", slug, besm) for place, (slug, besm) in enumerate(cards.items())
+    ]
     ledger.sort(key=lambda one: one.date)
     return replace(data, systems=(*data.systems[:-1], last), ledger=tuple(ledger))
 

@@ -276,3 +276,19 @@ def test_without_scripts_and_on_paper(browser: Browser, site: Path) -> None:
         page.emulate_media(media="print")
         assert page.locator("#fail-list > li").count() == 50
         assert page.get_by_text("Printed: the first 50 of 4,800").is_visible()
+
+
+def test_a_video_opened_from_a_filter_is_followed_by_the_others(context: BrowserContext, served: str) -> None:
+    page = opened(context, served, "?kind=near-miss")
+    count = page.locator("#fail-count").inner_text()
+    page.evaluate("document.addEventListener('click', (event) => event.preventDefault())")
+    page.locator(".fail-link").first.click()
+    walk = page.evaluate("JSON.parse(sessionStorage.getItem('coooler-walk'))")
+    assert walk["title"] == count
+    assert "/failures.html?kind=near-miss" in walk["from"]
+    first = page.locator(".fail-link").first.get_attribute("href")
+    assert first and first.startswith(walk["ids"][0] + "#")
+    assert len(set(walk["ids"])) == len(walk["ids"]) > 1
+    page.locator("#fail-clear").click()
+    page.locator(".fail-link").first.click()
+    assert page.evaluate("sessionStorage.getItem('coooler-walk')") is None

@@ -64,9 +64,7 @@ def opened(context: BrowserContext, address: str, query: str = "") -> Page:
 
 def column(page: Page, name: str) -> list[str]:
     """The first line of a column's cells, as shown."""
-    place = page.evaluate(
-        "name => document.querySelector(`[data-column=${name}]`).cellIndex + 1", name
-    )
+    place = page.evaluate("name => document.querySelector(`[data-column=${name}]`).cellIndex + 1", name)
     texts = page.locator(f"{ROWS} > :nth-child({place})").all_inner_texts()
     return [text.strip().split("\n")[0] for text in texts]
 
@@ -81,9 +79,7 @@ def cards(data: SiteData, threshold: float) -> dict[str, Scorecard]:
     made = {}
     for system in data.systems:
         submission = system.evaluation.submission
-        made[system.slug] = evaluate(
-            submission, truth, WordEmbedder(), threshold, truth_sha256(truth)
-        ).card
+        made[system.slug] = evaluate(submission, truth, WordEmbedder(), threshold, truth_sha256(truth)).card
     return made
 
 
@@ -163,6 +159,7 @@ def test_the_slider_by_key_and_back(context: BrowserContext, site: Path) -> None
     slider.focus()
     page.keyboard.press("ArrowRight")
     expect(slider).to_have_attribute("aria-valuetext", "0.81")
+    expect(page.locator(f"{ROWS} .range", has_text="published")).to_have_count(10)
     assert query_of(page) == {"threshold": "0.81"}
     page.keyboard.press("End")
     expect(slider).to_have_attribute("aria-valuetext", "0.95")
@@ -173,9 +170,13 @@ def test_the_slider_by_key_and_back(context: BrowserContext, site: Path) -> None
 
 
 @pytest.mark.parametrize(("name", "key"), [("sam", "sam"), ("recall", "hazard_recall"), ("besm", "besm")])
-def test_rank_by_another_score(context: BrowserContext, data: SiteData, site: Path, name: str, key: str) -> None:
+def test_rank_by_another_score(
+    context: BrowserContext, data: SiteData, site: Path, name: str, key: str
+) -> None:
     page = opened(context, site.as_uri(), "?rank=detection")
-    bands = [f"{s.rank}{'=' if sum(o.rank == s.rank for o in data.systems) > 1 else ''}" for s in data.systems]
+    bands = [
+        f"{s.rank}{'=' if sum(o.rank == s.rank for o in data.systems) > 1 else ''}" for s in data.systems
+    ]
     page.locator(f"#board-metric input[value={name}]").check()
     values = {s.slug: getattr(s.evaluation.card, key) for s in data.systems}
     order = slugs(page)
@@ -205,7 +206,7 @@ def test_columns_and_a_deep_link(context: BrowserContext, data: SiteData, root: 
         "q": "system",
         "open": data.systems[2].slug,
     }
-    again = opened(context, page.url)  if False else context.new_page()
+    again = context.new_page()
     again.goto(page.url)
     expect(again.locator(".board-facts")).to_be_visible()
     expect(again.locator("#board-threshold-text")).to_have_text("0.90")
@@ -222,7 +223,8 @@ def test_a_link_to_what_is_not_there_says_so(context: BrowserContext, site: Path
 
 def test_copies_are_what_is_shown(context: BrowserContext, data: SiteData, site: Path) -> None:
     context.add_init_script(
-        "Object.defineProperty(navigator, 'clipboard', {value: {writeText: async t => { window.copied = t; }}})"
+        "const clipboard = { writeText: async text => { window.copied = text; } };"
+        "Object.defineProperty(navigator, 'clipboard', { value: clipboard });"
     )
     page = opened(context, site.as_uri(), "?columns=besm,detection&threshold=0.90")
     expect(page.locator(f"{ROWS} .range", has_text="published")).to_have_count(10)
@@ -235,7 +237,9 @@ def test_copies_are_what_is_shown(context: BrowserContext, data: SiteData, site:
         assert f" | {markdown(system.name)} | " in line
         assert f" | {system.evaluation.card.besm:.4f} ({low:.2f}–{high:.2f}) | " in line
         assert line.endswith(f" | {percent(made[system.slug].detection_rate)} |")
-    assert "Detected above 0.90." in lines and any(line.startswith("Signature&#58; coooler") for line in lines)
+    assert "Detected above 0.90." in lines and any(
+        line.startswith("Signature&#58; coooler") for line in lines
+    )
     page.locator("#board-latex").click()
     text = page.evaluate("window.copied")
     assert "\\begin{tabular}{rlrr}" in text and "Rank & Submission & BESM & Detection \\\\" in text

@@ -190,6 +190,7 @@
 
   window.COOOLER_FAILURE_DATA = {
     index: () => index,
+    path: (place) => `videos/${videos[columns.video[place]][0]}.html`,
     columns: () => columns,
     videos,
     hazards,

@@ -9,12 +9,14 @@
   const page = (id) => document.getElementById(id);
   const search = page("search");
   const SLOW = 200; // milliseconds between two looks at what came
+  const MOST_WALKED = 20000;
   const state = { q: "", sort: filter.SORTS[0], at: "" };
   let facets = [];
   let version = 0;
   let totals = -1; // of which version
   let hits = { query: "", version: -1, found: null };
   let ready = false;
+  let walk = []; // the failures that fit, in order
   let typed = false; // whether the last change was typing, which makes one step in the history
 
   const index = data.index();
@@ -132,6 +134,7 @@
     }
     const order = filter.order(state.sort, version);
     const { places, counts } = filter.run(facets, hits.found, order);
+    walk = places;
     let all = null;
     if (totals !== version) {
       all = filter.run(facets.map((facet) => ({ ...facet, chosen: new Set() })), null, order).counts;
@@ -146,6 +149,20 @@
     meaning();
     list.show(places, state.at ? find(state.at) : -1);
     if (state.q && !data.hasTexts()) readTexts();
+  }
+
+  // A video that is opened from here is followed by the others of the filter.
+  function leave() {
+    const ids = Array.from(new Set(Array.from(walk.slice(0, MOST_WALKED), data.path)));
+    try {
+      if (page("fail-clear").hidden) sessionStorage.removeItem("coooler-walk");
+      else {
+        const title = page("fail-count").textContent;
+        sessionStorage.setItem("coooler-walk", JSON.stringify({ ids, from: address(), title }));
+      }
+    } catch (error) {
+      // Then videos follow each other in the usual order.
+    }
   }
 
   // What the one kind that is chosen means.
@@ -276,6 +293,9 @@
     }));
     page("fail-copy").addEventListener("click", copy);
     page("fail-clear").addEventListener("click", clear);
+    page("fail-list").addEventListener("click", ({ target }) => {
+      if (target.closest(".fail-link")) leave();
+    });
     document.addEventListener("keydown", keys);
     window.addEventListener("popstate", () => {
       typed = false;
