@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 from sitegen.build import build_site
 from sitegen.serve import serving
 from tests.browser_setup import ARGUMENTS, find_chromium
-from tests.site_fixtures import make_benchmark, make_board
+from tests.site_fixtures import WordEmbedder, make_benchmark, make_board
 
 pytestmark = pytest.mark.browser
 
@@ -26,6 +26,9 @@ PATHS = (
     "submissions/good-system.html",
     "method.html",
     "submit.html",
+    "compare.html",
+    "failures.html",
+    "vote.html",
 )
 
 
@@ -33,7 +36,7 @@ PATHS = (
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     benchmark = make_benchmark(tmp_path_factory.mktemp("benchmark"))
     out = tmp_path_factory.mktemp("site")
-    build_site(benchmark, out, make_board(benchmark))
+    build_site(benchmark, out, make_board(benchmark), embedder=WordEmbedder())
     return out
 
 
@@ -229,6 +232,17 @@ def test_videos_are_filtered(context: BrowserContext, site: Path) -> None:
     page.locator("select").select_option("")
     page.locator("#search").fill("deer road")
     assert page.locator(".card:visible .card-id").all_inner_texts() == ["v2"]
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+@pytest.mark.parametrize("path", PATHS)
+def test_every_page_reads_without_scripts(browser: Browser, site: Path, path: str, width: int) -> None:
+    with browser.new_context(java_script_enabled=False, viewport={"width": width, "height": 900}) as context:
+        page = open_page(context, f"{site.as_uri()}/{path}")
+        assert page.locator("h1").is_visible()
+        assert len(page.locator("main").inner_text()) > 150
+        assert page.locator(".js-only:visible").count() == 0
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
 def test_pages_read_without_scripts(browser: Browser, site: Path) -> None:
