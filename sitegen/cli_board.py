@@ -77,9 +77,10 @@ def submit(
         "licence": licence,
         "notes": notes,
     }
-    sender = with_agents(_sender({**given, "date": date}, about), file)
+    sender = _sender({**given, "date": date}, about)
     options = options_of(source_format, caption_column, video_map)
     path, read = _read(benchmark, file, options, markdown, sender.name)
+    sender = with_agents(sender, file)
     if rehearse:
         _rehearse(benchmark, path, read, sender, preview, markdown, as_json)
         return

@@ -124,6 +124,9 @@ def test_wrong_options_say_what_is_right(folder: Path) -> None:
     run = coooler(folder, "submit", "right.csv")
     assert run.returncode == 1
     assert "--name NAME" in run.stderr
+    run = coooler(folder, "submit", "videos", "--name", "A folder without predictions")
+    assert run.returncode == 1
+    assert "predictions.parquet: found no such file" in run.stderr
     (folder / "about.toml").write_text('name = "x"\nbesm = 0.99\n')
     run = coooler(folder, "submit", "right.csv", "--about", "about.toml")
     assert run.returncode == 1
