@@ -160,6 +160,17 @@ def test_every_filter(context: BrowserContext, data: SiteData, site: Path) -> No
         assert int(count) == sum(map(keep, data.video_ids)) and query_of(page)["show"] == name
 
 
+def test_a_video_opened_from_a_list_is_followed_by_the_others(context: BrowserContext, served: str) -> None:
+    page = opened(context, served, f"{PAIR}&sort=id&show=a-better")
+    rows = shown(page)
+    page.evaluate("document.addEventListener('click', (event) => event.preventDefault())")
+    page.locator("#duel-rows .duel-video").nth(1).click()
+    walk = page.evaluate("JSON.parse(sessionStorage.getItem('coooler-walk'))")
+    assert len(walk["ids"]) == len(rows) > 1
+    assert page.locator("#duel-rows .duel-video").nth(1).get_attribute("href") == walk["ids"][1]
+    assert "show=a-better" in walk["from"] and walk["title"] == page.locator("#duel-count").inner_text()
+
+
 def test_every_score(context: BrowserContext, data: SiteData, site: Path) -> None:
     page = opened(context, site.as_uri(), f"{PAIR}&sort=id")
     video = system(data, A).scores[data.video_ids[0]]

@@ -168,6 +168,19 @@
     moved(Number(made.dataset.place));
   });
 
+  // A video that is opened from here is followed by the others of the list, in its order.
+  list.addEventListener("click", (event) => {
+    if (!event.target.closest(".duel-video[href]")) return;
+    const links = list.querySelectorAll(".duel-video[href]");
+    const ids = Array.from(links, (link) => link.getAttribute("href").split("#")[0]);
+    const walk = { ids, from: location.href, title: count.textContent };
+    try {
+      sessionStorage.setItem("coooler-walk", JSON.stringify(walk));
+    } catch (error) {
+      // Then videos follow each other in the usual order.
+    }
+  });
+
   window.COOOLER_ROWS = {
     show,
     step: (by) => go(current < 0 && by < 0 ? 0 : current + by),
