@@ -1,12 +1,10 @@
 """A board of generated systems for the compare page, and its page in a folder, without building a site."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import BrowserContext, Page
 
 from pipeline.config import BenchmarkSettings
 from pipeline.records import Prediction, TruthHazard
@@ -18,7 +16,6 @@ from sitegen.evaluate import evaluate, truth_sha256
 from sitegen.gathered import SiteData, System, VideoMedia, path_names
 from sitegen.page_compare import compare_page
 from sitegen.uncertainty import uncertainties
-from tests.browser_setup import ARGUMENTS, find_chromium
 from tests.site_fixtures import EVIL, WordEmbedder
 
 WHO = ("cat", "deer", "dog", "cyclist", "truck", "tyre")
@@ -102,18 +99,6 @@ def write_page(data: SiteData, folder: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     return folder
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """A browser, closed afterwards."""
-    executable = find_chromium()
-    assert executable, "No Chromium; run: python -m tests.browser_setup"
-    with (
-        sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started,
-    ):
-        yield started
 
 
 def opened(context: BrowserContext, address: str, query: str = "") -> Page:

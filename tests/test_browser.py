@@ -7,11 +7,9 @@ from urllib.request import Request, urlopen
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from sitegen.build import build_site
-from sitegen.serve import serving
-from tests.browser_setup import ARGUMENTS, find_chromium
 from tests.site_fixtures import WordEmbedder, make_benchmark, make_board
 
 pytestmark = pytest.mark.browser
@@ -38,23 +36,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("site")
     build_site(benchmark, out, make_board(benchmark), embedder=WordEmbedder())
     return out
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    executable = find_chromium()
-    assert executable, "No Chromium; run: python -m tests.browser_setup"
-    with (
-        sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started,
-    ):
-        yield started
-
-
-@pytest.fixture(scope="module")
-def served(site: Path) -> Iterator[str]:
-    with serving(site) as address:
-        yield address
 
 
 @dataclass

@@ -11,8 +11,7 @@ from playwright.sync_api import Browser, BrowserContext, expect
 
 from sitegen.compare import compare
 from sitegen.gathered import SiteData
-from sitegen.serve import serving
-from tests.compare_case import PAIR, A, B, board, chromium, gap, opened, query_of, system, write_page
+from tests.compare_case import PAIR, A, B, board, gap, opened, query_of, system, write_page
 
 pytestmark = pytest.mark.browser
 
@@ -25,18 +24,6 @@ def data() -> SiteData:
 @pytest.fixture(scope="module")
 def site(data: SiteData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(data, tmp_path_factory.mktemp("compare"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def served(site: Path) -> Iterator[str]:
-    with serving(site) as address:
-        yield address
 
 
 @pytest.fixture

@@ -8,12 +8,10 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from sitegen.failures import SENTENCES, Blame, Failure, FailureKind
 from sitegen.gathered import SiteData
-from sitegen.serve import serving
-from tests.browser_setup import ARGUMENTS, find_chromium
 from tests.failures_case import generated, write_page
 
 pytestmark = pytest.mark.browser
@@ -27,23 +25,6 @@ def board() -> tuple[SiteData, dict[str, Blame]]:
 @pytest.fixture(scope="module")
 def site(board: tuple[SiteData, dict[str, Blame]], tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(*board, tmp_path_factory.mktemp("failures"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    executable = find_chromium()
-    assert executable, "No Chromium; run: python -m tests.browser_setup"
-    with (
-        sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started,
-    ):
-        yield started
-
-
-@pytest.fixture(scope="module")
-def served(site: Path) -> Iterator[str]:
-    with serving(site) as address:
-        yield address
 
 
 @pytest.fixture

@@ -12,9 +12,8 @@ from sitegen.evaluate import evaluate, truth_sha256
 from sitegen.exports import latex, markdown
 from sitegen.gathered import SiteData
 from sitegen.numerals import percent
-from sitegen.serve import serving
 from tests.board_case import site_data, write_page
-from tests.compare_case import chromium, query_of
+from tests.compare_case import query_of
 from tests.site_fixtures import WordEmbedder
 
 pytestmark = pytest.mark.browser
@@ -30,18 +29,6 @@ def data() -> SiteData:
 @pytest.fixture(scope="module")
 def site(data: SiteData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(data, tmp_path_factory.mktemp("board"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def served(site: Path) -> Iterator[str]:
-    with serving(site) as address:
-        yield address
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from pipeline.errors import FaultsError
 from pipeline.records import TruthHazard
@@ -18,7 +18,6 @@ from sitegen import checks, coool, formats, texts
 from sitegen.build import build_site
 from sitegen.readers import read_predictions, read_truth
 from sitegen.serve import serving
-from tests.browser_setup import ARGUMENTS, find_chromium
 from tests.site_fixtures import make_benchmark
 from tests.submit_case import HEAD, IDS, NO_HAZARD, TRUTH
 from tests.submit_corpus import cases
@@ -50,17 +49,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def truth(tmp_path_factory: pytest.TempPathFactory) -> list[TruthHazard]:
     return read_truth(make_benchmark(tmp_path_factory.mktemp("truth"), clips=3).truth)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    executable = find_chromium()
-    assert executable, "No Chromium; run: python -m tests.browser_setup"
-    with (
-        sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started,
-    ):
-        yield started
 
 
 @pytest.fixture

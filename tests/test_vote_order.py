@@ -1,26 +1,13 @@
 """The order of blind votes, run in a real Chromium on a page that holds nothing else."""
 
 import json
-from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 
 from sitegen.build import find_templates
-from tests.browser_setup import ARGUMENTS, find_chromium
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    executable = find_chromium()
-    assert executable, "No Chromium; run: python -m tests.browser_setup"
-    with (
-        sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS)) as started,
-    ):
-        yield started
 
 
 def test_the_order_is_fair(browser: Browser) -> None:
