@@ -65,7 +65,7 @@ def main(folder: Path) -> None:
         print(f"leaderboard: first paint {paint:.0f} ms, ready {ready:.0f} ms (goal: 1,000)")
         page.goto((folder / "failures.html").as_uri())
         begun = time.perf_counter()
-        page.wait_for_function("document.querySelector('#fail-progress').hidden", timeout=120_000)
+        page.wait_for_function("() => document.querySelector('#fail-progress').hidden", timeout=120_000)
         count = page.text_content("#fail-count")
         print(f"failure gallery: all data loaded in {time.perf_counter() - begun:.1f} s: {count}")
         answers = sorted(_filtered(page) for _ in range(ROUNDS))

@@ -136,7 +136,7 @@ def test_frames_by_key_and_click(context: BrowserContext, site: Path) -> None:
     page.keyboard.press("ArrowRight")
     current = page.locator("#strip a[aria-current]")
     assert current.get_attribute("href") == links.nth(4).get_attribute("href")
-    page.wait_for_function("document.getElementById('stage-picture').src.endsWith('f000005.jpg')")
+    page.wait_for_function("() => document.getElementById('stage-picture').src.endsWith('f000005.jpg')")
     assert page.locator("#stage-text").inner_text().startswith("Frame 5 ")
     assert page.locator("#stage svg rect").count() == 2
     page.locator("#frame-back").click()
@@ -163,7 +163,7 @@ def test_the_clip_plays_when_asked(context: BrowserContext, site: Path, served: 
     page = open_page(context, f"{served}/videos/v1.html")
     assert page.evaluate("document.querySelector('video').readyState") == 0
     page.evaluate("document.querySelector('video').play()")
-    page.wait_for_function("document.querySelector('video').currentTime > 0")
+    page.wait_for_function("() => document.querySelector('video').currentTime > 0")
     request = Request(f"{served}/media/v1/clip.mp4", headers={"Range": "bytes=0-9"})
     with urlopen(request) as answer:
         assert answer.status == 206 and len(answer.read()) == 10

@@ -94,7 +94,7 @@ def test_silent_and_inside(context: BrowserContext, root: str) -> None:
     page.locator(".board-open").first.click()
     expect(page.locator(".board-probes, .board-inside .sub").first).to_be_visible()
     page.locator(".charts").scroll_into_view_if_needed()
-    page.wait_for_function("!!window.Plotly")
+    page.wait_for_function("() => !!window.Plotly")
     assert complaints == [] and [url for url in asked if not url.startswith(f"{root}/")] == []
     assert sum("/board/" in url for url in asked) == 1
 
