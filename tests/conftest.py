@@ -10,7 +10,7 @@ from hypothesis import settings
 from tests.browser_setup import ARGUMENTS, find_chromium
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, BrowserContext
 
 # Deadlines measure the machine, not the code.
 settings.register_profile("coooler", deadline=None, derandomize=True)
@@ -38,3 +38,16 @@ def served(site: Path) -> Iterator[str]:
 
     with serving(site) as address:
         yield address
+
+
+@pytest.fixture
+def context(browser: "Browser") -> "Iterator[BrowserContext]":
+    """A wide window without any memory of others."""
+    with browser.new_context(viewport={"width": 1440, "height": 900}) as made:
+        yield made
+
+
+@pytest.fixture(params=["file", "http"])
+def root(request: pytest.FixtureRequest, site: Path, served: str) -> str:
+    """Where the file's `site` begins, opened by double-click and from a server."""
+    return site.as_uri() if request.param == "file" else served

@@ -1,6 +1,6 @@
 """The compare page in Chromium: choices, orders, filters, keys, links that restore what was seen."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -24,17 +24,6 @@ def data() -> SiteData:
 @pytest.fixture(scope="module")
 def site(data: SiteData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(data, tmp_path_factory.mktemp("compare"))
-
-
-@pytest.fixture
-def context(browser: Browser) -> Iterator[BrowserContext]:
-    with browser.new_context(viewport={"width": 1440, "height": 900}) as made:
-        yield made
-
-
-@pytest.fixture(params=["file", "http"])
-def root(request: pytest.FixtureRequest, site: Path, served: str) -> str:
-    return site.as_uri() if request.param == "file" else served
 
 
 def shown(page: Page) -> list[str]:

@@ -2,7 +2,6 @@
 
 import json
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -24,17 +23,6 @@ def data() -> SiteData:
 @pytest.fixture(scope="module")
 def site(data: SiteData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(data, tmp_path_factory.mktemp("compare"))
-
-
-@pytest.fixture
-def context(browser: Browser) -> Iterator[BrowserContext]:
-    with browser.new_context(viewport={"width": 1440, "height": 900}) as made:
-        yield made
-
-
-@pytest.fixture(params=["file", "http"])
-def root(request: pytest.FixtureRequest, site: Path, served: str) -> str:
-    return site.as_uri() if request.param == "file" else served
 
 
 @pytest.mark.parametrize("way", ["file", "http"])

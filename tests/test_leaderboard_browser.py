@@ -1,6 +1,5 @@
 """The leaderboard in Chromium: threshold, metric, columns, copies, details, links that restore it all."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -29,17 +28,6 @@ def data() -> SiteData:
 @pytest.fixture(scope="module")
 def site(data: SiteData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(data, tmp_path_factory.mktemp("board"))
-
-
-@pytest.fixture
-def context(browser: Browser) -> Iterator[BrowserContext]:
-    with browser.new_context(viewport={"width": 1440, "height": 900}) as made:
-        yield made
-
-
-@pytest.fixture(params=["file", "http"])
-def root(request: pytest.FixtureRequest, site: Path, served: str) -> str:
-    return site.as_uri() if request.param == "file" else served
 
 
 def opened(context: BrowserContext, address: str, query: str = "") -> Page:
