@@ -32,14 +32,23 @@ def locked(folder: Path) -> Iterator[None]:
 
 def sync_folder(folder: Path) -> None:
     """Have the disk hold every file of a folder, and the folder's list of them."""
-    for path in (*sorted(folder.iterdir()), folder):
-        if sys.platform == "win32" and path.is_dir():
-            continue
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    for path in sorted(folder.iterdir()):
+        _sync(path)
+    sync_listing(folder)
+
+
+def sync_listing(folder: Path) -> None:
+    """Have the disk hold a folder's list of files, after one was renamed into it (not on Windows)."""
+    if sys.platform != "win32":
+        _sync(folder)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def linked_copy(source: Path, target: Path) -> None:

@@ -23,7 +23,7 @@ from typing import Self
 from pydantic import ValidationError
 
 from pipeline.errors import CooolerError, InputError
-from pipeline.files import sync_folder, write_text
+from pipeline.files import sync_folder, sync_listing, write_text
 from sitegen.intake_records import Details, Report, State, Upload, is_id, new_id
 
 if sys.platform != "win32":
@@ -173,7 +173,7 @@ class Intake:
             if there:
                 return there
             arriving.folder.rename(self.folder / upload.upload_id)
-            _sync(self.folder)
+            sync_listing(self.folder)
             self._uploads[upload.upload_id] = upload
             self.changed.notify_all()
         return upload
@@ -301,13 +301,3 @@ def _hold(folder: Path) -> int:
                 f"{folder}: another server works on this queue; stop it first, or use its address."
             ) from error
     return handle
-
-
-def _sync(folder: Path) -> None:
-    if sys.platform == "win32":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -4,11 +4,19 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from pipeline.records import UsageRow
-from sitegen.contexts import Extreme, Fact, JudgedLine, KindCount, ProbeLine, Shell, SubmissionPage, VideoLine
+from sitegen.contexts import Fact, Shell
 from sitegen.failures import NAMES, SENTENCES, FailureKind
 from sitegen.gathered import SiteData, System
 from sitegen.numerals import percent, plural, score
 from sitegen.probes import Probe
+from sitegen.submission_contexts import (
+    Extreme,
+    JudgedLine,
+    KindCount,
+    ProbeLine,
+    SubmissionPage,
+    VideoLine,
+)
 from sitegen.uncertainty import Interval
 from sitegen.verdicts import best_pairs, first_share, ledger_line, rank_text, ranks_text, title_of, verdict
 from sitegen.words import shorten, visible

@@ -8,7 +8,7 @@ from pipeline import __version__
 from sitegen import charts
 from sitegen.board_files import board_files
 from sitegen.compare_files import compare_files
-from sitegen.contexts import LeaderboardPage, Link, MethodPage, Shell, SubmissionPage, VideosPage
+from sitegen.contexts import LeaderboardPage, Link, MethodPage, Shell, VideosPage
 from sitegen.exports import FORMATS
 from sitegen.failure_files import failure_files
 from sitegen.failures import Blame
@@ -22,6 +22,7 @@ from sitegen.page_submit import SubmitPage, submit_files, submit_page
 from sitegen.page_video import Place, video_page
 from sitegen.page_vote import VotePage, vote_files, vote_page
 from sitegen.spreads import spreads
+from sitegen.submission_contexts import SubmissionPage
 from sitegen.transcript import transcript
 from sitegen.verdicts import title_of
 from sitegen.video_contexts import VideoPage

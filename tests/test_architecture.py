@@ -78,6 +78,7 @@ FLOORS = [
         "sitegen.gathered",
         "sitegen.packing",
         "sitegen.sandbox_child",
+        "sitegen.submission_contexts",
         "sitegen.video_contexts",
         "sitegen.votes",
     ],
