@@ -163,6 +163,8 @@ class IntakeApp:
         """A file of the site, or the part of it that was asked for."""
         target = request.scope["raw_path"].decode("ascii", "replace")
         path = await to_thread.run_sync(find_file, self.site, target)
+        if path is None and target.startswith("/assets/"):  # the first site is still being built
+            path = await to_thread.run_sync(find_file, find_templates(), target)
         if path is None:
             return PlainTextResponse("There is no such page.", 404, _STATIC)
         response = self._files.file_response(path, path.stat(), request.scope)

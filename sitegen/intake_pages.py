@@ -210,7 +210,8 @@ def _sentences(scores: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _shell(benchmark: Benchmark, title: str, about: str, root: str) -> Shell:
-    return Shell(title, about, root, "submit", visible(benchmark.settings.name), __version__)
+    settings = benchmark.settings
+    return Shell(title, about, root, "submit", visible(settings.name), __version__, settings.hide_truth)
 
 
 def _render(template: str, page: UploadPage | StatusPage, shell: Shell, site: Path) -> bytes:

@@ -4,10 +4,14 @@ import json
 import socket
 import sys
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import pytest
 
+from pipeline.benchmark import open_benchmark
 from sitegen import intake_server
+from sitegen.build import find_templates
+from sitegen.intake_pages import upload_page
 from tests.intake_process import CSV, TOKEN, Answer, Server, multipart, running, small_benchmark
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="stops by signals")
@@ -47,6 +51,30 @@ def test_the_site_is_served_and_nothing_else(strict: Server) -> None:
         assert strict.ask("GET", path)[0] == 404, path
     assert strict.ask("DELETE", "/index.html")[0] == 405
     assert json.loads(strict.get("/api/health"))["status"] == "ok"
+
+
+def test_the_form_has_its_looks_before_a_site_is_built(strict: Server) -> None:
+    for name, kind in (("site.css", "text/css"), ("theme.js", "text/javascript")):
+        status, headers, body = strict.ask("GET", f"/assets/{name}")
+        assert status == 200 and headers["content-type"].startswith(kind)
+        assert body == (find_templates() / "assets" / name).read_bytes()
+    for path in (
+        "/assets/../base.html",
+        "/assets/%2e%2e/base.html",
+        "/base.html",
+        "/assets",
+        "/assets/none.css",
+    ):
+        assert strict.ask("GET", path)[0] == 404, path
+
+
+def test_with_a_hidden_truth_the_menu_leads_to_no_page_that_is_not_made(tmp_path: Path) -> None:
+    folder = small_benchmark(tmp_path / "b")
+    for hidden in (False, True):
+        (folder / "coooler.toml").write_text(f'name = "Small"\nhide_truth = {str(hidden).lower()}\n')
+        page = upload_page(open_benchmark(folder), folder / "site", {}, "", False, 1_000).decode()
+        assert ("failures.html" in page, "compare.html" in page) == (not hidden, not hidden)
+        assert "videos.html" in page
 
 
 def from_(number: int, **more: str) -> dict[str, str]:
