@@ -25,11 +25,16 @@ from sitegen.gathered import CropPicture, KeyframePicture, VideoMedia
 
 @dataclass(frozen=True, slots=True)
 class MediaSettings:
-    """Sizes are widths in pixels, qualities 1 to 100; pictures are never enlarged."""
+    """Sizes are widths in pixels, qualities 1 to 100; pictures are never enlarged.
+
+    The small keyframes of a video, which all load with its page, get the first of `thumb_qualities`
+    with which they take at most `thumbs_bytes` together, else the last.
+    """
 
     keyframes: int = 25
     thumb_px: int = 240
-    thumb_quality: int = 58
+    thumb_qualities: tuple[int, ...] = (58, 42, 28)
+    thumbs_bytes: int = 96 * 1024
     full_px: int = 800
     full_quality: int = 74
     cover_quality: int = 72
@@ -105,10 +110,11 @@ def make_media(job: MediaJob) -> MadeMedia:
     files: list[tuple[str, bytes]] = []
     frames: list[KeyframePicture] = []
     cover = _cover(found.frames, job.boxes)
-    for place, frame in enumerate(found.frames):
-        large = _fit(frame.rgb, settings.full_px)
+    larges = [_fit(frame.rgb, settings.full_px) for frame in found.frames]
+    thumbs = _thumbs([_fit(large, settings.thumb_px) for large in larges], settings)
+    for place, (frame, large, small) in enumerate(zip(found.frames, larges, thumbs, strict=True)):
         thumb, full = f"{folder}/t{frame.index:06d}.webp", f"{folder}/f{frame.index:06d}.jpg"
-        files.append((thumb, _webp(_fit(large, settings.thumb_px), settings.thumb_quality)))
+        files.append((thumb, small))
         if place == cover:
             full = f"{folder}/cover.webp"
             files.append((full, _webp(large, settings.cover_quality)))
@@ -155,6 +161,15 @@ def make_media(job: MediaJob) -> MadeMedia:
         found.note,
     )
     return MadeMedia(media, tuple(files))
+
+
+def _thumbs(pictures: Sequence[RgbImage], settings: MediaSettings) -> list[bytes]:
+    """The small keyframes as WebP, together as light as a page can afford."""
+    for quality in settings.thumb_qualities:
+        encoded = [_webp(picture, quality) for picture in pictures]
+        if sum(map(len, encoded)) <= settings.thumbs_bytes:
+            break
+    return encoded
 
 
 def choose_crops(

@@ -11,11 +11,15 @@ from urllib.parse import unquote, urlsplit
 from sitegen.build import find_templates
 
 OPEN_BYTES = 300 * 1024
-"""What opening a video page may load, all its pictures included; a clip loads when it is played."""
+"""What opening a video page may load, all its pictures included; a clip loads when it is played.
+
+A link to one keyframe shows that in place of the one that the page begins with, and loads both.
+"""
 
 INDEX_BYTES = 10 * 1024
 """Size of one file of index data, which covers at most 100 videos."""
 
+_PICTURES = (".jpg", ".webp")
 _ELEMENT = re.compile(r"<([a-zA-Z][a-zA-Z0-9]*)")
 
 
@@ -122,7 +126,11 @@ def _page(site: Path, path: Path, seen: _Seen, pages: dict[Path, _Seen]) -> Iter
 
 
 def _weight(path: Path, seen: _Seen) -> Iterator[str]:
-    files = {(path.parent / unquote(urlsplit(address).path)).resolve() for address in seen.loaded}
+    files, pictures = (
+        {(path.parent / unquote(urlsplit(address).path)).resolve() for address in addresses}
+        for addresses in (seen.loaded, [link for link in seen.links if link.endswith(_PICTURES)])
+    )
     total = sum(file.stat().st_size for file in sorted({path, *files}) if file.is_file())
+    total += max((file.stat().st_size for file in pictures - files if file.is_file()), default=0)
     if total > OPEN_BYTES:
-        yield f"loads {total:,} bytes when it opens; at most {OPEN_BYTES:,}"
+        yield f"loads {total:,} bytes when it opens at a keyframe; at most {OPEN_BYTES:,}"

@@ -67,3 +67,14 @@ def test_budgets(site: Path) -> None:
     faults = strict_faults(site)
     assert any("videos/v1.html: loads " in fault for fault in faults)
     assert any(fault.startswith("data/more/0.js: 10,241 bytes") for fault in faults)
+
+
+def test_a_link_to_a_keyframe_loads_one_picture_more(site: Path) -> None:
+    page = site / "videos" / "v1.html"
+    picture = site / "media" / "large.jpg"
+    picture.parent.mkdir(exist_ok=True)
+    picture.write_bytes(b"/" * OPEN_BYTES)
+    assert not any(fault.startswith("videos/v1.html: loads ") for fault in strict_faults(site))
+    link = '<a href="../media/large.jpg">x</a>'
+    page.write_text(page.read_text(encoding="utf-8").replace("<h1>", f"<h1>{link}", 1), encoding="utf-8")
+    assert any(fault.startswith("videos/v1.html: loads ") for fault in strict_faults(site))
