@@ -187,6 +187,7 @@ class BenchmarkSettings(Settings):
 
     `address` is where the site will be seen, ending in a slash; pages name it as theirs. With
     `hide_truth` the site shows scores, but no truth text, hazard box, crop or cosine of a pair.
+    `language` (BCP 47) is that of the site's words; every language but English needs a catalogue.
     """
 
     name: str = Field(default="A COOOLER benchmark", min_length=1, max_length=120)
@@ -196,6 +197,7 @@ class BenchmarkSettings(Settings):
     boxes: str = "boxes.parquet"
     submissions: str = "submissions"
     site: str = "site"
+    language: str = Field(default="en", pattern=r"^[a-z]{2,3}(-[A-Za-z0-9]{2,8})*$")
     address: str = Field(default="", pattern=r"^(https?://[^\s<>\"']+/)?$")
     attribution: str = ""
     show_videos: bool = True

@@ -104,6 +104,19 @@ class Video:
 
 
 @dataclass(frozen=True, slots=True)
+class VideoFile:
+    """What is known of a benchmark's video without looking at its frames; `file` lies in its folder."""
+
+    video_id: str
+    file: str
+    frame_count: int
+    fps_hz: float
+    width_px: int
+    height_px: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A decoded frame. The paper's models see `rgb` only; `boxes` serve the embedded agents."""
 

@@ -20,6 +20,7 @@ from pipeline.records import (
     TrackBox,
     TruthHazard,
     UsageRow,
+    VideoFile,
     VideoOutcome,
 )
 from pipeline.scores import PairScore, VideoScore
@@ -128,6 +129,22 @@ _BOX_COLUMNS = {
 }
 
 BOXES: Table[TrackBox] = Table("boxes", _schema(**_BOX_COLUMNS), _box_key, _box_row, _box)
+
+VIDEO_FILES: Table[VideoFile] = Table(
+    "video_files",
+    _schema(
+        video_id=_STRING,
+        file=_STRING,
+        frame_count=_INT,
+        fps_hz=_REAL,
+        width_px=_INT,
+        height_px=_INT,
+        sha256=_STRING,
+    ),
+    lambda video: (video.video_id,),
+    _plain,
+    lambda row: VideoFile(**row),
+)
 
 TRUTH: Table[TruthHazard] = Table(
     "truth",
@@ -276,6 +293,7 @@ VIDEOS: Table[VideoScore] = Table(
 
 TABLES: tuple[Table[Any], ...] = (
     BOXES,
+    VIDEO_FILES,
     TRUTH,
     PREDICTIONS,
     STAGES,

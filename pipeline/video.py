@@ -214,6 +214,31 @@ def read_keyframes(path: Path, video_id: str, count: int = 25) -> Keyframes:
     return Keyframes(video, frames, "; ".join(notes))
 
 
+def probe(path: Path, video_id: str) -> Video:
+    """Frame count, frame rate and upright frame size of a file, decoding as little as that takes.
+
+    The packets are counted; a file whose packets cannot be trusted is decoded whole. The size is the
+    first frame's: what the header states is only a claim. Raises VideoError as `read_keyframes` does,
+    except that damage behind the first frame may go unseen.
+    """
+    try:
+        index = _read_index(path)
+        with _open(path) as container:
+            container.streams.video[0].codec_context.thread_count = 1
+            reader = _Reader(path, {0})
+            for frame in container.decode(video=0):
+                reader.take(0, frame)
+                break
+        total = index.packets if index.is_sound else _decode_all(path, ()).total
+    except FFmpegError as error:
+        raise VideoError(f"{path}: decoding failed: {error}. Copy the file again.") from error
+    if not reader.rgb or not total:
+        raise VideoError(f"{path}: it holds no frame that can be decoded. Copy the file again.")
+    height_px, width_px = reader.rgb[0][1].shape[:2]
+    fps_hz = index.fps_hz if 0 < index.fps_hz < 10_000 else 0.0
+    return Video(video_id, path, total, fps_hz, width_px, height_px)
+
+
 def crop(rgb: RgbImage, box: Box) -> RgbImage | None:
     """The part of a frame (H, W, 3) inside `box`, rounded outwards to whole pixels.
 

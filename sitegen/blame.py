@@ -31,6 +31,8 @@ from pipeline.records import Prediction, TruthHazard
 from pipeline.scores import Evaluation, PairScore
 from sitegen.failures import NEAR_MISS, Blame, Failure, FailureKind, FunnelStep
 from sitegen.gathered import Records, System
+from sitegen.language import fixed
+from sitegen.language import gettext as _
 from sitegen.mentions import Mentions, Question
 from sitegen.sayings import Step, counted, instead, is_recorded, of_caption, quoted, sayings, too_small
 from sitegen.score import TOLERANCE
@@ -169,7 +171,7 @@ def _ask_captions(mentions: Mentions, sheets: Sequence[_Sheet], threshold: float
         caption.names.add(hazard.hazard_id)
         pair = caption.pairs[hazard.hazard_id]
         if one and (one.caption is None or _rank(pair) < _rank(one.caption[0])):
-            one.caption = pair, f"{said.where} {quoted(hit.words)}"
+            one.caption = pair, said.quoting(hit.words)
 
 
 def _ask(mentions: Mentions, lost: Iterable[_Lost], step: Step) -> None:
@@ -181,7 +183,7 @@ def _ask(mentions: Mentions, lost: Iterable[_Lost], step: Step) -> None:
     ]
     for (one, said), hit in zip(asked, mentions.first(questions), strict=True):
         if hit is not None:
-            one.said[step] = f"{said[hit.text].where} {quoted(hit.words)}"
+            one.said[step] = said[hit.text].quoting(hit.words)
 
 
 def _lost_at(one: _Lost) -> Step | None:
@@ -211,7 +213,10 @@ def _of_hazard(one: _Lost, threshold: float) -> Failure:
     rank = None
     if one.is_near and one.best:
         kind, rank = FailureKind.NEAR_MISS, one.best.prediction_rank
-        evidence = f"Caption {rank} comes to {one.best.similarity:.4f}; more than {threshold:.2f} is needed."
+        text = _("Caption {n} comes to {similarity}; more than {threshold} is needed.")
+        evidence = text.format(
+            n=rank, similarity=fixed(one.best.similarity, 4), threshold=fixed(threshold, 2)
+        )
     elif one.is_named:
         rank = one.caption[0].prediction_rank if one.caption else None
         small = too_small(one.records, one.hazard, one.others)
@@ -230,40 +235,52 @@ def _of_hazard(one: _Lost, threshold: float) -> Failure:
 def _named_evidence(one: _Lost, small: str, threshold: float) -> str:
     if one.caption:
         pair, words = one.caption
-        score = f"similarity {pair.similarity:.4f}; more than {threshold:.2f} is needed"
+        score = _("similarity {similarity}; more than {threshold} is needed").format(
+            similarity=fixed(pair.similarity, 4), threshold=fixed(threshold, 2)
+        )
     else:
-        words, score = one.said[Step.ANOMALOUS], "no caption does"
-    return f"{words}, but {small} ({score})." if small else f"{words}: {score}."
+        words, score = one.said[Step.ANOMALOUS], _("no caption does")
+    text = _("{said}, but {snippets} ({score}).") if small else _("{said}: {score}.")
+    return text.format(said=words, snippets=small, score=score)
 
 
 def _lost_evidence(one: _Lost, step: Step | None) -> str:
     before = next((one.said[s] for s in reversed(_STEPS) if s in one.said), "")
     if one.records is None or step is None:
         error = one.records.outcome.error if one.records and one.records.outcome else ""
-        reason = f"the run failed: {quoted(error)}" if error else "what became of it is not recorded"
-        return f"{before or 'No caption mentions it'}; {reason}."
+        reason = _("what became of it is not recorded")
+        if error:
+            reason = _("the run failed: {error}").format(error=quoted(error))
+        before = before or _("No caption mentions it")
+        return _("{said}; {more}.").format(said=before, more=reason)
     if step is Step.SEEN:
-        return f"None of {counted(one.records)} mentions it."
+        return _("None of {counts} mentions it.").format(counts=counted(one.records))
+    lists = instead(one.records, step)
     if not before:
-        return f"Where the record begins it is not there: {instead(one.records, step)}."
+        return _("Where the record begins it is not there: {lists}.").format(lists=lists)
     if step is Step.MERGED and is_recorded(one.records, Step.ELEMENTS):
-        too = "names it too" if Step.ELEMENTS in one.said else "does not name it"
-        before = f"{before}; the AES {too}"
-    return f"{before}; {instead(one.records, step)}."
+        text = _("{said}; the AES does not name it")
+        if Step.ELEMENTS in one.said:
+            text = _("{said}; the AES names it too")
+        before = text.format(said=before)
+    return _("{said}; {more}.").format(said=before, more=lists)
 
 
 def _of_caption(caption: _Caption, sheet: _Sheet) -> Failure:
     prediction = caption.prediction
     lost = [h for h in caption.hazards if (h.video_id, h.hazard_id) in sheet.lost]
-    start = f"Caption {prediction.rank}, {quoted(prediction.description, _EVIDENCE_CHARS)},"
+    kind, names = FailureKind.EXTRA, ""
     if lost:
         kind = FailureKind.WRONG_OBJECT
-        names = " or ".join(dict.fromkeys(quoted(h.label or h.description, 40) for h in lost[:2]))
-        evidence = f"{start} does not mention {names}, which is not found."
+        two = list(dict.fromkeys(quoted(h.label or h.description, 40) for h in lost[:2]))
+        names = _("{one} or {other}").format(one=two[0], other=two[1]) if len(two) > 1 else two[0]
+        text = _("Caption {n}, {words}, does not mention {names}, which is not found.")
     elif caption.hazards:
-        kind, evidence = FailureKind.EXTRA, f"{start} mentions no hazard of the video; all are found."
+        text = _("Caption {n}, {words}, mentions no hazard of the video; all are found.")
     else:
-        kind, evidence = FailureKind.EXTRA, f"{start} speaks of a hazard where there is none."
+        text = _("Caption {n}, {words}, speaks of a hazard where there is none.")
+    words = quoted(prediction.description, _EVIDENCE_CHARS)
+    evidence = text.format(n=prediction.rank, words=words, names=names)
     records = sheet.records.get(prediction.video_id)
     known = bool(records and records.stages)
     return Failure(kind, prediction.video_id, None, prediction.rank, caption.best, evidence, known)

@@ -13,6 +13,8 @@ import numpy as np
 
 from sitegen.charts import script_json
 from sitegen.gathered import SiteData, System
+from sitegen.language import gettext as _
+from sitegen.language import said_again
 from sitegen.numerals import score
 from sitegen.score import passes
 from sitegen.words import shorten, visible
@@ -67,7 +69,7 @@ def _parts(data: SiteData) -> Iterator[dict[str, Any]]:
 
 def _system(data: SiteData, system: System, steps: tuple[float, ...]) -> dict[str, Any]:
     probes = [
-        [visible(probe.name), visible(probe.text), visible(probe.sentence)]
+        [_(probe.name), visible(said_again(probe.text)), visible(said_again(probe.sentence))]
         for probe in system.probes
         if probe.flagged
     ]

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from datetime import date
 from itertools import groupby
 
+from sitegen.language import fixed, marked, ngettext, whole
+from sitegen.language import gettext as _
 from sitegen.ledger import Entry
 from sitegen.numerals import number, plural
 from sitegen.words import shorten, visible
@@ -67,29 +69,49 @@ def history(entries: Sequence[Entry]) -> History | None:
         return None
     if len(days) == 1:
         one = days[0]
-        words = f"Everything on this board came on {one.day}: {plural(len(one.board), 'submission')}, "
-        return History(f"{words}{_leading(one)}. From the second day on, a chart shows how it changes.")
+        words = _(
+            "Everything on this board came on {day}: {submissions}, {system} leads with BESM {besm}. From "
+            "the second day on, a chart shows how it changes."
+        )
+        return History(
+            words.format(
+                day=one.day,
+                submissions=plural(len(one.board), "{n} submission", "{n} submissions"),
+                system=_leader(one),
+                besm=fixed(_best(one), 4),
+            )
+        )
     first, last = next(one for one in days if one.board), days[-1]
-    now = f"Now {_leading(last)}." if last.board else "Now the board is empty."
-    risen = _best(last) - _best(first) if last.board else 0.0
-    moved = f" That is {risen:+.4f} since {first.day}." if last.board else ""
+    now = _("Now the board is empty.")
+    if last.board:
+        risen = _best(last) - _best(first)
+        now = _("Now {system} leads with BESM {besm}. That is {difference} since {day}.").format(
+            system=_leader(last),
+            besm=fixed(_best(last), 4),
+            difference=marked(f"{risen:+.4f}").replace("-", "−"),
+            day=first.day,
+        )
+    changed = ngettext(
+        "{n} day on which the board changed, {first} to {last}.",
+        "{n} days on which the board changed, {first} to {last}.",
+        len(days),
+    )
     low, high = _range(days)
     slugs = sorted({slug for one in days for slug in one.board}, key=lambda slug: (-_peak(days, slug), slug))
     shown = [one for one in days if one.changes][-SHOWN_DAYS:]
     left = len(days) - len(shown)
     return History(
-        summary=f"{plural(len(days), 'day')} on which the board changed, {days[0].day} to {last.day}. "
-        f"{now}{moved.replace('-0.', '−0.')}",
+        summary=f"{changed.format(n=whole(len(days)), first=days[0].day, last=last.day)} {now}",
         lines=tuple(
             _path(days, [one.board[slug][0] if slug in one.board else None for one in days], low, high)
             for slug in slugs[:SHOWN_LINES]
         ),
         best=_path(days, [_best(one) if one.board else None for one in days], low, high),
-        ticks=tuple(Tick(number(_y(value, low, high)), f"{value:.2f}") for value in _grid(low, high)),
+        ticks=tuple(Tick(number(_y(value, low, high)), fixed(value, 2)) for value in _grid(low, high)),
         first=f"{days[0].day}",
         last=f"{last.day}",
         days=tuple(_day(one) for one in reversed(shown)),
-        days_left_out=f"{plural(left, 'earlier day')} left out." if left else "",
+        days_left_out=plural(left, "{n} earlier day left out.", "{n} earlier days left out.") if left else "",
     )
 
 
@@ -103,10 +125,10 @@ def _days(entries: Iterable[Entry]) -> list[_Standing]:
             name = shorten(visible(entry.name), _NAME_CHARS)
             if entry.event == "withdraw":
                 board.pop(entry.slug, None)
-                changes.append(f"{name} withdrawn")
+                changes.append(_("{system} withdrawn").format(system=name))
             elif entry.besm is not None:
                 board[entry.slug] = (entry.besm, name)
-                changes.append(f"{name} {entry.besm:.4f}")
+                changes.append(f"{name} {fixed(entry.besm, 4)}")
         assert day is not None
         days.append(_Standing(day, dict(board), tuple(changes)))
     return days
@@ -127,17 +149,13 @@ def _leader(one: _Standing) -> str:
     return min(one.board.values(), key=lambda row: (-row[0], row[1]))[1]
 
 
-def _leading(one: _Standing) -> str:
-    return f"{_leader(one)} leads with BESM {_best(one):.4f}"
-
-
 def _peak(days: Sequence[_Standing], slug: str) -> float:
     return max(one.board[slug][0] for one in days if slug in one.board)
 
 
 def _day(one: _Standing) -> Day:
-    best, leader = (f"{_best(one):.4f}", _leader(one)) if one.board else ("–", "–")
-    return Day(f"{one.day}", best, leader, f"{len(one.board):,}", ", ".join(one.changes))
+    best, leader = (fixed(_best(one), 4), _leader(one)) if one.board else ("–", "–")
+    return Day(f"{one.day}", best, leader, whole(len(one.board)), ", ".join(one.changes))
 
 
 def _range(days: Sequence[_Standing]) -> tuple[float, float]:

@@ -15,8 +15,12 @@ from pipeline.errors import InputError, OutsideError
 from pipeline.files import sha256_of
 from pipeline.interfaces import Embedder
 from sitegen.blame import blame_board
+from sitegen.catalogues import read_language, script_messages
+from sitegen.charts import script_json
+from sitegen.data_check_run import inputs_of, stored_check
 from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
 from sitegen.gathered import SiteData, VideoMedia, path_names
+from sitegen.language import ENGLISH, gettext, marked, ngettext, speaking, whole
 from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json
 from sitegen.output import Output, open_output, stamped, tree_sha256
 from sitegen.pages import Page, data_files, make_pages
@@ -28,9 +32,10 @@ if TYPE_CHECKING:
 Tell = Callable[[str, int, int], None]
 """Told what is being done, how many of it are done, and how many there are."""
 
+CATALOGUE = "assets/catalogue.js"
 PLOTLY = "assets/plotly.min.js"
 _FEW = 2  # starting processes costs more than this many clips
-_OURS = ("data", "media", "submissions", "videos")  # folders of a site that only a build fills
+_OURS = ("data", "media", "restored", "submissions", "videos")  # folders of a site that only a build fills
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +73,7 @@ def build_site(
     the truth, the boxes, the records or the attribution cannot be read, and when the truth is hidden
     but `out` holds what an unknown build left there.
     """
+    read_language(benchmark.settings.language, find_locale())  # that it can be read, before the long part
     tell = _telling(bar)
     truth = read_truth_by_video(benchmark)
     names = path_names(truth)
@@ -76,6 +82,10 @@ def build_site(
     todo = media_jobs(benchmark, names, boxes, settings or MediaSettings())
     media, remembered, decoded = _all_media(output, todo, jobs, tell)
     data = gather(benchmark, truth, boxes, media, board, as_of)
+    if not data.hidden:
+        rows = [row for found in truth.values() for row in found]
+        clips = {job.video_id: job.clip_sha256 for job in todo}
+        data = replace(data, check=stored_check(benchmark.root, inputs_of(rows, benchmark.boxes, clips)))
     digest = put_pages(output, data, embedder, tell)
     removed = output.finish(remembered)
     if data.hidden:
@@ -86,12 +96,17 @@ def build_site(
 
 def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: Tell) -> str:
     """Put all of a site but its pictures, which are there, into `output`; give the tree's hash."""
-    if embedder and not data.hidden:
-        data = _with_blame(data, embedder)
     output.add_all(_assets(with_charts=bool(data.systems)))
-    output.add_all(data_files(data))
-    total = len(data.names) + len(data.systems) + 7
-    pages = _rendered(make_pages(data), data.settings.address, total, tell)
+    total = len(data.names) + len(data.systems) + 8 + (not data.restored.is_empty)
+    language = data.settings.language
+    with speaking(read_language(language, find_locale())):
+        if embedder and not data.hidden:
+            data = _with_blame(data, embedder)
+        output.add_all(data_files(data))
+        pages = _rendered(make_pages(data), data.settings.address, total, tell)
+    if language != ENGLISH.tag:
+        messages = script_json(script_messages(language, find_locale()))
+        output.add_all([(CATALOGUE, f"window.COOOLER_CATALOGUE = {messages};\n".encode())])
     blank = {path: sha256_of(page) for path, page in pages.items()}
     digest = tree_sha256({**output.files, **blank})
     output.add_all((path, stamped(page, digest)) for path, page in pages.items())
@@ -132,17 +147,26 @@ def find_templates() -> Path:
     raise OutsideError(f"{here}: the templates are missing. Install COOOLER again.")
 
 
+def find_locale() -> Path:
+    """The folder of the catalogues that pages are translated by."""
+    return find_templates() / "locale"
+
+
 @cache
 def environment() -> Environment:
     """The jinja environment: everything escaped, an undefined name is an error; one a process."""
-    return Environment(
+    made = Environment(
         loader=FileSystemLoader(find_templates()),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
+        extensions=["jinja2.ext.i18n"],
     )
+    made.install_gettext_callables(gettext, ngettext, newstyle=True)  # type: ignore[attr-defined]
+    made.filters |= {"marked": marked, "whole": whole}
+    return made
 
 
 def _rendered(pages: Iterator[Page], address: str, total: int, tell: Tell) -> dict[str, bytes]:

@@ -9,6 +9,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from sitegen.language import fixed
+from sitegen.language import gettext as _
 from sitegen.words import shorten, visible
 
 Figure = dict[str, Any]
@@ -64,7 +66,7 @@ def besm_against_sam(systems: Sequence[Point]) -> Figure:
             "cliponaxis": False,
             "marker": {"size": 12, "color": _colour(place), "symbol": place % 8},
             "hovertemplate": f"{label(point.name)}<br>BESM %{{x:.4f}}<br>SAM %{{y:.4f}}"
-            f"<br>detection {point.detection_rate * 100:.1f} %<extra></extra>",
+            f"<br>{_('detection')} {point.detection_rate * 100:.1f} %<extra></extra>",
         }
         for place, point in enumerate(systems)
     ]
@@ -112,7 +114,10 @@ def score_distribution(systems: Sequence[tuple[str, Sequence[float]]], threshold
             "y": counts(values),
             "name": label(name),
             "marker": {"color": _colour(place)},
-            "hovertemplate": "%{y} videos near %{x:.2f}<extra>" + label(name) + "</extra>",
+            "hovertemplate": _("{n} videos near {similarity}").format(n="%{y}", similarity="%{x:.2f}")
+            + "<extra>"
+            + label(name)
+            + "</extra>",
         }
         for place, (name, values) in enumerate(systems)
     ]
@@ -131,7 +136,7 @@ def score_distribution(systems: Sequence[tuple[str, Sequence[float]]], threshold
         "yref": "paper",
         "xanchor": "right",
         "yanchor": "top",
-        "text": f"detected above {threshold:.2f} ",
+        "text": _("detected above {threshold}").format(threshold=fixed(threshold, 2)) + " ",
         "showarrow": False,
     }
     return {
@@ -139,8 +144,8 @@ def score_distribution(systems: Sequence[tuple[str, Sequence[float]]], threshold
         "layout": {
             "barmode": "group",
             "bargap": 0.15,
-            "xaxis": {"title": {"text": "best similarity in a video"}, "range": [0, 1]},
-            "yaxis": {"title": {"text": "videos"}, "rangemode": "tozero"},
+            "xaxis": {"title": {"text": _("best similarity in a video")}, "range": [0, 1]},
+            "yaxis": {"title": {"text": _("videos")}, "rangemode": "tozero"},
             "shapes": [line],
             "annotations": [note],
             "showlegend": True,
@@ -179,7 +184,7 @@ def means_by_group(
             "barmode": "group",
             "bargap": 0.25,
             "xaxis": {"type": "category", "tickangle": "auto"},
-            "yaxis": {"title": {"text": "mean best similarity"}, "range": [0, 1]},
+            "yaxis": {"title": {"text": _("mean best similarity")}, "range": [0, 1]},
             "shapes": [line],
             "showlegend": True,
         },

@@ -19,6 +19,7 @@ from pipeline.scores import PairScore, VideoScore
 from sitegen.charts import script_json
 from sitegen.compare import Comparison
 from sitegen.gathered import SiteData, System
+from sitegen.language import gettext as _
 from sitegen.paired import RESAMPLES, SEED, all_pairs
 from sitegen.uncertainty import SIGNIFICANT, Key
 from sitegen.verdicts import best_pairs, title_of
@@ -56,7 +57,8 @@ def tests(systems: tuple[System, ...]) -> dict[tuple[int, int], dict[Key, Compar
 
 def shown_name(system: System) -> str:
     """The name of a system as pages show it; a preview says so."""
-    return f"{visible(system.name)} (rehearsal)" if system.rehearsed else visible(system.name)
+    name = visible(system.name)
+    return _("{system} (rehearsal)").format(system=name) if system.rehearsed else name
 
 
 def short_name(system: System) -> str:
@@ -88,9 +90,9 @@ def compare_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
             number = block // BLOCK
             ids = data.video_ids[block : block + BLOCK]
             parts = list(_parts([_captions(system, video_id) for video_id in ids], block))
-            for cut, (_, part) in enumerate(parts):
+            for cut, (_start, part) in enumerate(parts):
                 yield _file(f"captions/{system.slug}/{number}-{cut}", part)
-            content = _scores(scores[block : block + BLOCK], [start for start, _ in parts])
+            content = _scores(scores[block : block + BLOCK], [start for start, _part in parts])
             yield _file(f"scores/{system.slug}/{number}", script_json(content))
 
 

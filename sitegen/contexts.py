@@ -15,7 +15,8 @@ from sitegen.numerals import Score
 class Shell:
     """What every page has; `section` names the entry of the menu that it belongs to.
 
-    With `hidden` the menu leaves out the pages that would tell of the truth.
+    With `hidden` the menu leaves out the pages that would tell of the truth. `language` is a BCP 47 tag;
+    `restored` says that there is a page of restored clips.
     """
 
     title: str
@@ -25,6 +26,8 @@ class Shell:
     benchmark: str
     version: str
     hidden: bool = False
+    language: str = "en"
+    restored: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,10 @@ from typing import Any, NamedTuple
 
 from pipeline.records import TruthHazard
 from sitegen.charts import script_json
-from sitegen.failures import NAMES, SENTENCES, Blame, Failure, FailureKind
+from sitegen.failures import Blame, Failure, FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData, System
+from sitegen.language import N_, marked
+from sitegen.language import gettext as _
 from sitegen.words import shorten, visible
 
 INDEX_FILE = "data/failures.js"
@@ -38,15 +40,15 @@ EVIDENCE_CHARS = 360
 ID_CHARS = 60
 
 SIZES: dict[str, str] = {
-    "small": "Small, under 0.33\u202f%",
-    "medium": "Medium, under 3\u202f%",
-    "large": "Large, 3\u202f% or more",
-    "unknown": "Unknown",
-    "none": "None: a caption’s failure",
+    "small": N_("Small, under 0.33\u202f%"),
+    "medium": N_("Medium, under 3\u202f%"),
+    "large": N_("Large, 3\u202f% or more"),
+    "unknown": N_("Unknown"),
+    "none": N_("None: a caption’s failure"),
 }
-STAGES: dict[str, str] = {"known": "Stages recorded", "unknown": "Stages not recorded"}
-NO_LABEL = "Without a label"
-NOT_A_HAZARD = "None: a caption’s failure"
+STAGES: dict[str, str] = {"known": N_("Stages recorded"), "unknown": N_("Stages not recorded")}
+NO_LABEL = N_("Without a label")
+NOT_A_HAZARD = N_("None: a caption’s failure")
 
 _CALL_BYTES = 200  # at most, around the value of a shard
 _KINDS = tuple(FailureKind)
@@ -90,7 +92,7 @@ def shown(data: SiteData, blames: Mapping[str, Blame]) -> Shown:
 
 
 def _words(row: TruthHazard) -> tuple[str, str]:
-    label = shorten(" ".join(visible(row.label).split()), LABEL_CHARS) or NO_LABEL
+    label = shorten(" ".join(visible(row.label).split()), LABEL_CHARS) or _(NO_LABEL)
     return label, shorten(visible(row.description), TRUTH_CHARS)
 
 
@@ -132,6 +134,11 @@ def range_key(ends: tuple[float, float]) -> str:
     return f"{low:.4g}-{high:.4g}"
 
 
+def _range_words(ends: tuple[float, float]) -> str:
+    low, high = (marked(f"{end:.4g}") for end in ends)
+    return _("{low} to {high}").format(low=low, high=high)
+
+
 def caption_of(system: System, failure: Failure) -> str:
     """The caption that a failure means; empty when there is none."""
     rows = system.predictions.get(failure.video_id, ())
@@ -151,7 +158,8 @@ def shown_id(video_id: str) -> str:
 
 def system_name(system: System) -> str:
     """A system's name as it is shown; a preview says so."""
-    return f"{visible(system.name)} (rehearsal)" if system.rehearsed else visible(system.name)
+    name = visible(system.name)
+    return _("{system} (rehearsal)").format(system=name) if system.rehearsed else name
 
 
 def failure_files(data: SiteData, blames: Mapping[str, Blame]) -> Iterator[tuple[str, bytes]]:
@@ -162,7 +170,7 @@ def failure_files(data: SiteData, blames: Mapping[str, Blame]) -> Iterator[tuple
     places = {video_id: place for place, video_id in enumerate(data.video_ids)}
     labels = sorted({row.label.casefold(): row.label for row in reversed(found.hazards)}.items())
     codes = {folded: code for code, (folded, _) in enumerate(labels, start=1)}
-    index = _index(data, found, [NOT_A_HAZARD, *(label for _, label in labels)])
+    index = _index(data, found, [_(NOT_A_HAZARD), *(label for _, label in labels)])
     ends: dict[str, list[int]] = {"videos": [], "hazards": []}
     videos = [_video(data, video_id) for video_id in data.video_ids]
     hazards = [_hazard(row, places, codes) for row in found.hazards]
@@ -189,11 +197,11 @@ def _index(data: SiteData, found: Shown, labels: list[str]) -> dict[str, Any]:
     """What comes with the page, but for where each shard ends."""
     ranges = score_ranges(data.settings.threshold)
     return {
-        "kinds": [[kind.value, NAMES[kind], SENTENCES[kind]] for kind in _KINDS],
-        "stages": list(STAGES.items()),
-        "ranges": [[range_key(ends), range_key(ends).replace("-", " to ")] for ends in ranges],
+        "kinds": [[kind.value, name_of(kind), meaning_of(kind)] for kind in _KINDS],
+        "stages": [[stage, _(words)] for stage, words in STAGES.items()],
+        "ranges": [[range_key(ends), _range_words(ends)] for ends in ranges],
         "range": round(RANGE * UNITS),
-        "sizes": list(SIZES.items()),
+        "sizes": [[size, _(words)] for size, words in SIZES.items()],
         "labels": labels,
         "threshold": data.settings.threshold,
         "units": UNITS,

@@ -6,6 +6,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from sitegen.language import N_
+from sitegen.language import gettext as _
+
 NEAR_MISS = 0.10
 """How far under the threshold a similarity is still a near miss (ours)."""
 
@@ -26,32 +29,47 @@ class FailureKind(StrEnum):
 
 
 NAMES: dict[FailureKind, str] = {
-    FailureKind.NOT_SEEN: "Not seen",
-    FailureKind.NOT_RANKED: "Not ranked",
-    FailureKind.LOST_IN_MERGING: "Lost in merging",
-    FailureKind.NOT_ANOMALOUS: "Not judged an anomaly",
-    FailureKind.TOO_SMALL: "Too small",
-    FailureKind.NEAR_MISS: "Near miss",
-    FailureKind.OTHER_WORDS: "Other words",
-    FailureKind.NOTHING_SAID: "Nothing said",
-    FailureKind.WRONG_OBJECT: "Wrong object",
-    FailureKind.EXTRA: "Extra hazard",
+    FailureKind.NOT_SEEN: N_("Not seen"),
+    FailureKind.NOT_RANKED: N_("Not ranked"),
+    FailureKind.LOST_IN_MERGING: N_("Lost in merging"),
+    FailureKind.NOT_ANOMALOUS: N_("Not judged an anomaly"),
+    FailureKind.TOO_SMALL: N_("Too small"),
+    FailureKind.NEAR_MISS: N_("Near miss"),
+    FailureKind.OTHER_WORDS: N_("Other words"),
+    FailureKind.NOTHING_SAID: N_("Nothing said"),
+    FailureKind.WRONG_OBJECT: N_("Wrong object"),
+    FailureKind.EXTRA: N_("Extra hazard"),
 }
 
 SENTENCES: dict[FailureKind, str] = {
-    FailureKind.NOT_SEEN: "No scene description and no video answer mentions the hazard.",
-    FailureKind.NOT_RANKED: "The vision agent mentions the hazard, but the Ranked Hazards Set does not.",
-    FailureKind.LOST_IN_MERGING: "The hazard was ranked, but is not in the Critical Object Set, where both "
-    "tracks are merged.",
-    FailureKind.NOT_ANOMALOUS: "The hazard was among the objects, but was not judged an anomaly.",
-    FailureKind.TOO_SMALL: "The hazard is named at the end, but all its snippets were under the size limits, "
-    "so that nothing was compared, and no caption passes the threshold.",
-    FailureKind.NEAR_MISS: "The best caption is at most 0.10 under the threshold.",
-    FailureKind.OTHER_WORDS: "The hazard is named at the end, but in words too far from the truth’s.",
-    FailureKind.NOTHING_SAID: "No caption mentions the hazard; where it was lost is not recorded.",
-    FailureKind.WRONG_OBJECT: "The caption mentions no hazard of the video, and one of them is not found.",
-    FailureKind.EXTRA: "The caption mentions no hazard of the video, and there is none left to find.",
+    FailureKind.NOT_SEEN: N_("No scene description and no video answer mentions the hazard."),
+    FailureKind.NOT_RANKED: N_("The vision agent mentions the hazard, but the Ranked Hazards Set does not."),
+    FailureKind.LOST_IN_MERGING: N_(
+        "The hazard was ranked, but is not in the Critical Object Set, where both tracks are merged."
+    ),
+    FailureKind.NOT_ANOMALOUS: N_("The hazard was among the objects, but was not judged an anomaly."),
+    FailureKind.TOO_SMALL: N_(
+        "The hazard is named at the end, but all its snippets were under the size limits, so that nothing "
+        "was compared, and no caption passes the threshold."
+    ),
+    FailureKind.NEAR_MISS: N_("The best caption is at most 0.10 under the threshold."),
+    FailureKind.OTHER_WORDS: N_("The hazard is named at the end, but in words too far from the truth’s."),
+    FailureKind.NOTHING_SAID: N_("No caption mentions the hazard; where it was lost is not recorded."),
+    FailureKind.WRONG_OBJECT: N_(
+        "The caption mentions no hazard of the video, and one of them is not found."
+    ),
+    FailureKind.EXTRA: N_("The caption mentions no hazard of the video, and there is none left to find."),
 }
+
+
+def name_of(kind: FailureKind) -> str:
+    """The kind in a word or two."""
+    return _(NAMES[kind])
+
+
+def meaning_of(kind: FailureKind) -> str:
+    """What the kind means, in a sentence."""
+    return _(SENTENCES[kind])
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pipeline.records import Kind, Match, Snippet, Stage, StageOutput
+from sitegen.language import fixed
+from sitegen.language import gettext as _
 from sitegen.numerals import plural
 from sitegen.words import shorten, visible
 
@@ -133,27 +135,33 @@ def figure2(
     for track in shown:
         places = by_track[track]
         kept = sorted(places, key=lambda place: _worth(place, rows[place], pictures))[:per_track]
-        count = plural(len(places), "snippet")
+        count = plural(len(places), "{n} snippet", "{n} snippets")
         tracks.append(
             TrackRows(
                 shorten(visible(track), 24),
                 track in hazards,
-                count if len(kept) == len(places) else f"{len(kept)} of {count}",
+                count if len(kept) == len(places) else _("{n} of {total}").format(n=len(kept), total=count),
                 tuple(row(place) for place in sorted(kept, key=lambda place: place[1])),
             )
         )
     groups, more_groups = _groups(matches, columns, anomalous, hazards)
     rest = order[len(shown) :]
     left_out = [
-        f"{plural(len(rest), 'more track')} with {plural(sum(len(by_track[t]) for t in rest), 'snippet')}"
+        _("{tracks} with {snippets}").format(
+            tracks=plural(len(rest), "{n} more track", "{n} more tracks"),
+            snippets=plural(sum(len(by_track[t]) for t in rest), "{n} snippet", "{n} snippets"),
+        )
         if rest
         else "",
-        plural(more_columns, "more label") if more_columns else "",
-        plural(more_groups, "more group") if more_groups else "",
+        plural(more_columns, "{n} more label", "{n} more labels") if more_columns else "",
+        plural(more_groups, "{n} more group", "{n} more groups") if more_groups else "",
     ]
     return Figure2(
-        f"{plural(len(rows), 'snippet')} of {plural(len(order), 'track')} against "
-        f"{plural(len(columns) + more_columns, 'label')}",
+        _("{snippets} of {tracks} against {labels}").format(
+            snippets=plural(len(rows), "{n} snippet", "{n} snippets"),
+            tracks=plural(len(order), "{n} track", "{n} tracks"),
+            labels=plural(len(columns) + more_columns, "{n} label", "{n} labels"),
+        ),
         _number(low),
         _number(high),
         tuple(Column(shorten(visible(label), 36), label in anomalous) for label in columns),
@@ -204,7 +212,7 @@ def _groups(
                     (shorten(visible(track), 24), track in hazards, _frames(sorted(found[label][track])))
                     for track in tracks[:MAX_GROUP_TRACKS]
                 ),
-                f"and {plural(len(rest), 'more track')}" if rest else "",
+                plural(len(rest), "and {n} more track", "and {n} more tracks") if rest else "",
             )
         )
     return tuple(groups), max(0, len(order) - MAX_GROUPS)
@@ -226,16 +234,15 @@ def _cell(match: Match | None, low: float, high: float) -> Cell:
 
 
 def _number(cosine: float) -> str:
-    text = f"{cosine:.3f}"
-    return "0.000" if text == "-0.000" else text.replace("-", "−")
+    return fixed(round(cosine, 3), 3).replace("-", "−")
 
 
 def _frames(frames: Sequence[int]) -> str:
     if len(frames) == 1:
-        return f"frame {frames[0]}"
+        return _("frame {n}").format(n=frames[0])
     if len(frames) <= _FEW_FRAMES:
-        return f"frames {', '.join(map(str, frames))}"
-    return f"{len(frames)} frames, {frames[0]} to {frames[-1]}"
+        return _("frames {list}").format(list=", ".join(map(str, frames)))
+    return _("{n} frames, {first} to {last}").format(n=len(frames), first=frames[0], last=frames[-1])
 
 
 def _natural(track: str) -> tuple[bool, int, str]:

@@ -20,10 +20,13 @@ from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES, USAGE
 from sitegen import ledger
 from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names
 from sitegen.hiding import totals_only, videos_only, words_only
+from sitegen.language import N_, Said
+from sitegen.language import gettext as _
 from sitegen.leaderboard import Ranked, rank
 from sitegen.ledger import Entry
 from sitegen.media import MediaJob, MediaSettings
 from sitegen.readers import read_truth
+from sitegen.restoration import read_restorations
 from sitegen.standings import Standing
 from sitegen.submissions import StoredSubmission
 from sitegen.uncertainty import Uncertainty, require_same_signature, uncertainties
@@ -119,6 +122,7 @@ def gather(
         entries,
         ledger_file,
         load_votes(benchmark, {one.stored.slug: one.stored.predictions_sha256 for one in board}),
+        restored=read_restorations(benchmark.videos),
     )
 
 
@@ -147,11 +151,11 @@ def _system(row: Ranked, standing: Standing, uncertainty: Uncertainty, hidden: b
         for video_id in sorted({*stages, *snippets, *matches, *outcomes})
     }
     facts = (
-        ("SHA-256 of the file as it came", stored.original_sha256),
-        ("SHA-256 of the predictions", stored.predictions_sha256),
-        ("SHA-256 of the configuration", stored.config_sha256),
+        (N_("SHA-256 of the file as it came"), stored.original_sha256),
+        (N_("SHA-256 of the predictions"), stored.predictions_sha256),
+        (N_("SHA-256 of the configuration"), stored.config_sha256),
     )
-    agents = stored.agents or "Not stated"
+    agents = stored.agents or Said(lambda: _("Not stated"))
     return System(
         rank=row.rank,
         place=row.place,

@@ -20,10 +20,13 @@ from pipeline.records import (
     VideoOutcome,
 )
 from pipeline.scores import Evaluation, PairScore, VideoScore
+from sitegen.data_findings import StoredCheck
 from sitegen.failures import Blame
 from sitegen.judgements import Votes
+from sitegen.language import N_
 from sitegen.ledger import Entry
 from sitegen.probes import Probe
+from sitegen.restoration import Restorations
 from sitegen.uncertainty import Uncertainty
 
 V = TypeVar("V", PairScore, Prediction)
@@ -45,7 +48,7 @@ class Published:
 
 # Paper, table 1.
 PUBLISHED = Published(
-    "COOOLER, the paper's pipeline with its own models", 0.3922, 0.3922, 200, 0.80, "Shriram et al. 2025"
+    N_("COOOLER, the paper's pipeline with its own models"), 0.3922, 0.3922, 200, 0.80, "Shriram et al. 2025"
 )
 
 
@@ -162,7 +165,9 @@ class SiteData:
     """All inputs of the pages. `systems` come best first; mappings are keyed by video id.
 
     `boxes` holds the boxes on the keyframes only; `names` maps a video id to its path part;
-    `ledger_file` is the ledger as it lies on disk, `votes` are people's on pairs of captions. With
+    `ledger_file` is the ledger as it lies on disk, `votes` are people's on pairs of captions;
+    `check` is what the last `coooler data check` found, None when it was not kept or is hidden;
+    `restored` is what was done to the clips before they came here. With
     `hidden` nothing here tells of the truth: every video has no rows, and no system has scores of
     pairs or single videos.
     """
@@ -177,6 +182,8 @@ class SiteData:
     ledger: tuple[Entry, ...] = ()
     ledger_file: bytes = b""
     votes: Votes = field(default_factory=Votes)
+    check: StoredCheck | None = None
+    restored: Restorations = field(default_factory=Restorations)
 
     @property
     def hidden(self) -> bool:

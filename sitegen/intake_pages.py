@@ -8,9 +8,12 @@ from typing import Any
 
 from pipeline import __version__
 from pipeline.benchmark import Benchmark
-from sitegen.build import environment
+from sitegen.build import environment, find_locale
+from sitegen.catalogues import read_language
 from sitegen.contexts import Fact, Shell
 from sitegen.intake_records import FIELDS, Report, Upload
+from sitegen.language import N_, fixed, marked, speaking, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import percent, plural
 from sitegen.output import BLANK, stamped
 from sitegen.readers import FORMATS
@@ -21,12 +24,12 @@ REFRESH_S = 3
 
 _TREE = re.compile(rb'id="tree-sha256">([0-9a-f]{64})<')
 _HEADINGS = {
-    "queued": "Waiting",
-    "working": "Being read and scored",
-    "good": "The file is right",
-    "accepted": "On the leaderboard",
-    "refused": "Not accepted",
-    "failed": "Put aside",
+    "queued": N_("Waiting"),
+    "working": N_("Being read and scored"),
+    "good": N_("The file is right"),
+    "accepted": N_("On the leaderboard"),
+    "refused": N_("Not accepted"),
+    "failed": N_("Put aside"),
 }
 
 
@@ -83,28 +86,36 @@ def upload_page(
     max_bytes: int,
 ) -> bytes:
     """The page of the form."""
-    page = UploadPage(
-        message=message,
-        values={name: values.get(name, "") for name in FIELDS},
-        lengths=FIELDS,
-        formats=FORMATS,
-        asks_token=asks_token,
-        max_mb=f"{max_bytes / 2**20:,.4g} MB",
-        checker="submit.html" if (site / "submit.html").is_file() else "",
-    )
-    shell = _shell(benchmark, "Upload predictions", "Check or submit a predictions file.", "")
-    return _render("upload.html", page, shell, site)
+    with speaking(read_language(benchmark.settings.language, find_locale())):
+        page = UploadPage(
+            message=message,
+            values={name: values.get(name, "") for name in FIELDS},
+            lengths=FIELDS,
+            formats=FORMATS,
+            asks_token=asks_token,
+            max_mb=marked(f"{max_bytes / 2**20:,.4g} MB"),
+            checker="submit.html" if (site / "submit.html").is_file() else "",
+        )
+        about = _("Check or submit a predictions file.")
+        return _render("upload.html", page, _shell(benchmark, _("Upload predictions"), about, ""), site)
 
 
 def status_page(
     benchmark: Benchmark, site: Path, upload: Upload, report: Report, before: int, is_behind: bool
 ) -> bytes:
     """The page of an upload; `before` uploads go first, `is_behind` says that the site is not up to date."""
+    with speaking(read_language(benchmark.settings.language, find_locale())):
+        page = _status(site, upload, report, before, is_behind)
+        shell = _shell(benchmark, page.heading, _("What became of an upload."), "../")
+        return _render("upload_status.html", page, shell, site)
+
+
+def _status(site: Path, upload: Upload, report: Report, before: int, is_behind: bool) -> StatusPage:
     told = upload.details
     href = f"submissions/{report.slug}.html" if report.slug else ""
     is_published = bool(href) and (site / href).is_file()
     is_changing = upload.is_waiting or (upload.state == "accepted" and is_behind and not is_published)
-    page = StatusPage(
+    return StatusPage(
         state=upload.state,
         heading=_heading(upload, report),
         lede=_lede(upload, report, before, is_published, is_behind),
@@ -114,19 +125,17 @@ def status_page(
         sentences=_sentences(report.scores),
         warnings=tuple(map(visible, report.warnings)),
         facts=(
-            Fact("File", visible(told.file_name)),
-            Fact("Size", plural(upload.size, "byte")),
+            Fact(_("File"), visible(told.file_name)),
+            Fact(_("Size"), plural(upload.size, "{n} byte", "{n} bytes")),
             Fact("SHA-256", upload.sha256, code=True),
-            *([Fact("Name", visible(told.name))] if told.name else []),
-            Fact("Sent to be", "checked only" if told.kind == "check" else "put on the leaderboard"),
-            *([Fact("Read as", report.source_format)] if report.source_format else []),
-            *([Fact("Signature", report.scores["signature"], code=True)] if report.scores else []),
+            *([Fact(_("Name"), visible(told.name))] if told.name else []),
+            Fact(_("Sent to be"), _("checked only") if told.kind == "check" else _("put on the leaderboard")),
+            *([Fact(_("Read as"), report.source_format)] if report.source_format else []),
+            *([Fact(_("Signature"), report.scores["signature"], code=True)] if report.scores else []),
         ),
         href=href if is_published else "",
         is_check=told.kind == "check",
     )
-    about = "What became of an upload."
-    return _render("upload_status.html", page, _shell(benchmark, page.heading, about, "../"), site)
 
 
 def as_json(upload: Upload, report: Report | None, before: int) -> dict[str, Any]:
@@ -152,23 +161,23 @@ def as_json(upload: Upload, report: Report | None, before: int) -> dict[str, Any
 
 def _heading(upload: Upload, report: Report) -> str:
     if report.faults:
-        return f"{plural(len(report.faults), 'fault')} found"
-    return _HEADINGS[upload.state]
+        return plural(len(report.faults), "{n} fault found", "{n} faults found")
+    return _(_HEADINGS[upload.state])
 
 
 def _lede(upload: Upload, report: Report, before: int, is_published: bool, is_behind: bool) -> str:
-    queued = (
-        f"{plural(before, 'upload goes', 'uploads go')} before this one." if before else "This one is next."
-    )
-    accepted = "It was stored and scored, but is no longer on the board."
+    queued = _("This one is next.")
+    if before:
+        queued = plural(before, "{n} upload goes before this one.", "{n} uploads go before this one.")
+    accepted = _("It was stored and scored, but is no longer on the board.")
     if is_published:
-        accepted = "It is stored, scored and on the board."
+        accepted = _("It is stored, scored and on the board.")
     elif is_behind:
-        accepted = "It is stored and scored; its page is there in a moment."
+        accepted = _("It is stored and scored; its page is there in a moment.")
     said = {
         "queued": queued,
-        "working": "This takes some seconds.",
-        "good": "Nothing was stored. These are the scores that it would have.",
+        "working": _("This takes some seconds."),
+        "good": _("Nothing was stored. These are the scores that it would have."),
         "accepted": accepted,
     }
     return said.get(upload.state) or visible_lines(report.message)
@@ -180,9 +189,9 @@ def visible_lines(text: str) -> str:
 
 
 def _fault_line(fault: Any) -> FaultLine:
-    row = "" if fault.row is None else f"{fault.row:,}"
+    row = "" if fault.row is None else whole(fault.row)
     if fault.line is not None:
-        row += f" (line {fault.line:,})"
+        row += " " + _("(line {n})").format(n=whole(fault.line))
     texts = (fault.column or "", fault.found, fault.expected, fault.mend)
     return FaultLine(row.strip(), *map(visible, texts))
 
@@ -193,9 +202,10 @@ def _cards(scores: Mapping[str, Any]) -> tuple[Fact, ...]:
         metric = scores.get("metrics", {}).get(name)
         if metric:
             is_mean = name in {"besm", "sam"}
-            words = (lambda value: f"{value:.4f}") if is_mean else percent
+            words = (lambda value: fixed(value, 4)) if is_mean else percent
             ends = [words(metric[end]) for end in ("low", "high") if end in metric]
-            cards.append(Fact(title, words(metric["value"]), note=" to ".join(ends)))
+            note = _("{low} to {high}").format(low=ends[0], high=ends[1]) if ends else ""
+            cards.append(Fact(_(title), words(metric["value"]), note=note))
     return tuple(cards)
 
 
@@ -203,15 +213,18 @@ def _sentences(scores: Mapping[str, Any]) -> tuple[str, ...]:
     """Where it would stand, what it covers, and what the probes say."""
     said = [rank_words(scores)] if "band" in scores else []
     if "predictions" in scores:
-        captions = plural(scores["predictions"], "prediction")
-        said.append(f"{captions} for {plural(scores['videos_with_predictions'], 'video')}.")
+        text = _("{predictions} for {videos}.")
+        captions = plural(scores["predictions"], "{n} prediction", "{n} predictions")
+        videos = plural(scores["videos_with_predictions"], "{n} video", "{n} videos")
+        said.append(text.format(predictions=captions, videos=videos))
     said += [probe["sentence"] for probe in scores.get("probes", ()) if probe["flagged"]]
     return tuple(map(visible, said))
 
 
 def _shell(benchmark: Benchmark, title: str, about: str, root: str) -> Shell:
     settings = benchmark.settings
-    return Shell(title, about, root, "submit", visible(settings.name), __version__, settings.hide_truth)
+    name, language = visible(settings.name), settings.language
+    return Shell(title, about, root, "submit", name, __version__, settings.hide_truth, language)
 
 
 def _render(template: str, page: UploadPage | StatusPage, shell: Shell, site: Path) -> bytes:

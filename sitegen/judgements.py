@@ -16,6 +16,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from pipeline.scores import Evaluation, VideoScore
+from sitegen.language import N_, fixed, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import plural
 from sitegen.score import Real
 from sitegen.uncertainty import SAME, Interval, interval
@@ -29,8 +31,8 @@ MIN_DECIDED = 10
 METRICS: dict[Metric, tuple[str, Callable[[VideoScore], float]]] = {
     "besm": ("BESM", lambda video: video.besm),
     "sam": ("SAM", lambda video: video.sam),
-    "detection": ("Detection", lambda video: float(video.detected)),
-    "best": ("Best similarity", lambda video: video.best),
+    "detection": (N_("Detection"), lambda video: float(video.detected)),
+    "best": (N_("Best similarity"), lambda video: video.best),
 }
 """Each metric's name and its value in [0, 1] for a video."""
 
@@ -178,21 +180,32 @@ def agreement_table(votes: Votes, evaluations: Mapping[str, Evaluation]) -> Agre
         return AgreementTable()
     found = agreement(current, evaluations)
     voters, videos = len({vote.voter for vote in current}), len({vote.video_id for vote in current})
-    summary = f"{plural(len(current), 'vote')} by {plural(voters, 'voter')} on {plural(videos, 'video')}."
+    summary = _("{votes} by {voters} on {videos}.").format(
+        votes=plural(len(current), "{n} vote", "{n} votes"),
+        voters=plural(voters, "{n} voter", "{n} voters"),
+        videos=plural(videos, "{n} video", "{n} videos"),
+    )
     if ties := found[0].vote_ties:
-        summary += f" {plural(ties, 'tie')} left out."
+        summary += " " + plural(ties, "{n} tie left out.", "{n} ties left out.")
     if votes.apart:
-        summary += f" {plural(votes.apart, 'vote')} on captions that have changed since, kept apart."
+        summary += " " + plural(
+            votes.apart,
+            "{n} vote on captions that have changed since, kept apart.",
+            "{n} votes on captions that have changed since, kept apart.",
+        )
     return AgreementTable(summary, tuple(_line(one) for one in found))
 
 
 def _line(one: Agreement) -> AgreementLine:
     tau = "–" if one.tau is None else _signed(one.tau)
-    span = f"{_signed(one.interval.low)} to {_signed(one.interval.high)}" if one.interval else "–"
-    name, _ = METRICS[one.metric]
-    return AgreementLine(name, tau, span, f"{one.concordant + one.discordant:,}", f"{one.metric_ties:,}")
+    span = "–"
+    if one.interval:
+        low, high = _signed(one.interval.low), _signed(one.interval.high)
+        span = _("{low} to {high}").format(low=low, high=high)
+    name = _(METRICS[one.metric][0])
+    return AgreementLine(name, tau, span, whole(one.concordant + one.discordant), whole(one.metric_ties))
 
 
 def _signed(value: float) -> str:
     """Two digits, with a true minus; never "−0.00"."""
-    return f"{round(value, 2) + 0.0:.2f}".replace("-", "\u2212")
+    return fixed(round(value, 2), 2).replace("-", "\u2212")

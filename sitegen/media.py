@@ -21,6 +21,7 @@ from pipeline.files import sha256_of
 from pipeline.records import Box, Frame, Kind, RgbImage, TrackBox
 from pipeline.video import read_keyframes
 from sitegen.gathered import CropPicture, KeyframePicture, VideoMedia
+from sitegen.language import N_
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,8 @@ def media_from_json(data: dict[str, Any]) -> VideoMedia:
 def make_media(job: MediaJob) -> MadeMedia:
     """Decode the clip once and encode its pictures. A clip that cannot be used is said, not raised."""
     if job.clip is None:
-        return MadeMedia(VideoMedia(job.video_id, job.name, problem="There is no clip of this video."), ())
+        missing = N_("There is no clip of this video.")
+        return MadeMedia(VideoMedia(job.video_id, job.name, problem=missing), ())
     try:
         found = read_keyframes(job.clip, job.video_id, job.settings.keyframes)
     except VideoError as error:
@@ -112,9 +114,9 @@ def make_media(job: MediaJob) -> MadeMedia:
     cover = _cover(found.frames, job.boxes)
     larges = [_fit(frame.rgb, settings.full_px) for frame in found.frames]
     thumbs = _thumbs([_fit(large, settings.thumb_px) for large in larges], settings)
-    for place, (frame, large, small) in enumerate(zip(found.frames, larges, thumbs, strict=True)):
+    for place, (frame, large, encoded) in enumerate(zip(found.frames, larges, thumbs, strict=True)):
         thumb, full = f"{folder}/t{frame.index:06d}.webp", f"{folder}/f{frame.index:06d}.jpg"
-        files.append((thumb, small))
+        files.append((thumb, encoded))
         if place == cover:
             full = f"{folder}/cover.webp"
             files.append((full, _webp(large, settings.cover_quality)))

@@ -15,6 +15,8 @@ import numpy as np
 
 from pipeline.interfaces import Embedder
 from sitegen.evaluate import embed_all
+from sitegen.language import N_, fixed
+from sitegen.language import gettext as _
 from sitegen.phrase_cache import phrases_of
 from sitegen.phrases import Phrase, lemmas, nouns, sentences, topics
 from sitegen.score import Real
@@ -27,17 +29,16 @@ HEAD_NEAR = 0.65
 
 _SAID = "There is a {} on the road."  # the embedder was trained on sentences, and tells these apart better
 
-RULE = (
+RULE = N_(
     "A text mentions a hazard when one of its noun phrases (spaCy) names what the truth’s label, or the "
     "subject of the truth’s description, names: by the same noun; by a word for its kind at large (“animal” "
     "for a deer, but not “dog”), or for one of a kind where the truth is general; or by near meaning: the "
     "embedder’s cosine of the two phrases, each in the sentence “There is a … on the road.”, is at least "
-    f"{NEAR:.2f}, and that of their last nouns at least {HEAD_NEAR:.2f}. What a text says is not there (“no "
+    "{near}, and that of their last nouns at least {head_near}. What a text says is not there (“no "
     "pedestrians”), the own vehicle, and words that fit anything (“object”) do not count. On 104 labelled "
     "texts kept back when the rule was chosen, 49 of the 50 mentions that it found are right, and it found "
     "49 of 53."
 )
-"""The rule as the method page prints it."""
 
 _KINDS = """
 animal wildlife creature
@@ -107,6 +108,11 @@ def _kinds() -> dict[str, frozenset[tuple[int, ...]]]:
             for word in group.split():
                 places.setdefault(word, set()).add(way)
     return {word: frozenset(found) for word, found in places.items()}
+
+
+def rule() -> str:
+    """The rule as the method page prints it."""
+    return _(RULE).format(near=fixed(NEAR, 2), head_near=fixed(HEAD_NEAR, 2))
 
 
 def related(one: str, other: str) -> bool | None:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from sitegen.language import fixed, ngettext, whole
+
 
 @dataclass(frozen=True, slots=True)
 class Score:
@@ -20,7 +22,7 @@ class Score:
 
 def score(value: float, passed: bool | None = None, digits: int = 4) -> Score:
     """A similarity or mean; `passed` is None where no threshold applies."""
-    return _score(value, f"{value + 0.0:.{digits}f}", passed)
+    return _score(value, fixed(value, digits), passed)
 
 
 def rate(value: float, passed: bool | None = None) -> Score:
@@ -36,17 +38,17 @@ def _score(value: float, text: str, passed: bool | None) -> Score:
 
 def percent(value: float) -> str:
     """A share in [0, 1] as percent with one digit."""
-    return f"{value * 100:.1f}\u202f%"
+    return f"{fixed(value * 100, 1)}\u202f%"
 
 
-def plural(count: int, one: str, many: str = "") -> str:
-    """`3 videos`, `1 video`."""
-    return f"{count:,} {one if count == 1 else many or one + 's'}"
+def plural(count: int, one: str, many: str) -> str:
+    """`3 videos` of `{n} video` and `{n} videos`, in the page's language."""
+    return ngettext(one, many, count).format(n=whole(count))
 
 
 def seconds(value: float) -> str:
     """A time in a clip, to a tenth of a second."""
-    return f"{value:.1f}\u202fs"
+    return f"{fixed(value, 1)}\u202fs"
 
 
 def number(value: float) -> str:

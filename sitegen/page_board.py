@@ -18,6 +18,8 @@ from sitegen.contexts import (
     VideosPage,
 )
 from sitegen.gathered import PUBLISHED, SiteData, System
+from sitegen.language import fixed, ngettext, said_again, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import Score, percent, plural, score, seconds
 from sitegen.spreads import spreads
 from sitegen.verdicts import (
@@ -56,11 +58,11 @@ def leaderboard_page(
         threshold=threshold_text(data.settings.threshold),
         downloads=downloads,
         published=(
-            Fact("System", PUBLISHED.system),
-            Fact("BESM", f"{PUBLISHED.besm:.4f}"),
-            Fact("SAM", f"{PUBLISHED.sam:.4f}"),
-            Fact("Videos", str(PUBLISHED.n_videos)),
-            Fact("Threshold", f"{PUBLISHED.threshold:.2f}"),
+            Fact(_("System"), _(PUBLISHED.system)),
+            Fact("BESM", fixed(PUBLISHED.besm, 4)),
+            Fact("SAM", fixed(PUBLISHED.sam, 4)),
+            Fact(_("Videos"), str(PUBLISHED.n_videos)),
+            Fact(_("Threshold"), fixed(PUBLISHED.threshold, 2)),
         ),
         ledger=tuple(ledger_line(data, entry) for entry in reversed(entries)),
         ledger_summary=_ledger_summary(data),
@@ -70,36 +72,42 @@ def leaderboard_page(
         heat=() if data.hidden else tuple(_heat_row(data, system) for system in data.systems),
         cards=cards(data, SHOWN_CARDS),
         thresholds=tuple(map(threshold_text, thresholds(data))),
-        heat_left_out=f"{HEAT_VIDEOS} of {videos:,}" if videos > HEAT_VIDEOS else "",
-        cards_left_out=f"All {videos:,} videos" if videos > SHOWN_CARDS else "",
+        heat_left_out=_("{n} of {total}").format(n=HEAT_VIDEOS, total=whole(videos))
+        if videos > HEAT_VIDEOS
+        else "",
+        cards_left_out=_("All {n} videos").format(n=whole(videos)) if videos > SHOWN_CARDS else "",
         history=history(data.ledger),
     )
 
 
 def videos_page(data: SiteData, shell: Shell) -> VideosPage:
     """videos.html"""
-    summary, threshold = plural(len(data.truth), "video"), f"{data.settings.threshold:.2f}"
+    summary, threshold = plural(len(data.truth), "{n} video", "{n} videos"), fixed(data.settings.threshold, 2)
     return VideosPage(shell, data.hidden, cards(data), summary, threshold)
 
 
 def _facts(data: SiteData) -> tuple[Fact, ...]:
-    videos = Fact("videos", f"{len(data.truth):,}")
-    submissions = Fact("submissions", f"{sum(not system.rehearsed for system in data.systems):,}")
+    videos = Fact(_("videos"), whole(len(data.truth)))
+    submissions = Fact(_("submissions"), whole(sum(not system.rehearsed for system in data.systems)))
     if data.hidden:
         return videos, submissions
     hazards = sum(not hazard.is_no_hazard for rows in data.truth.values() for hazard in rows)
     empty = sum(all(hazard.is_no_hazard for hazard in rows) for rows in data.truth.values())
     return (
         videos,
-        Fact("described hazards", f"{hazards:,}"),
-        Fact("without a hazard", f"{empty:,}"),
+        Fact(_("described hazards"), whole(hazards)),
+        Fact(_("without a hazard"), whole(empty)),
         submissions,
     )
 
 
 def _row(data: SiteData, system: System, part: int) -> BoardRow:
     card, submission, sure = system.evaluation.card, system.evaluation.submission, system.uncertainty
-    name, authors, agents = visible(system.name), visible(submission.authors), visible(system.agents)
+    name, authors, agents = (
+        visible(system.name),
+        visible(submission.authors),
+        visible(said_again(system.agents)),
+    )
     flagged = sum(probe.flagged for probe in system.probes)
     recall = None
     if card.hazard_recall is not None and sure.hazard_recall is not None:
@@ -115,7 +123,7 @@ def _row(data: SiteData, system: System, part: int) -> BoardRow:
         agents=agents,
         is_baseline=system.is_baseline,
         is_rehearsed=system.rehearsed,
-        flags=plural(flagged, "probe speaks", "probes speak") if flagged else "",
+        flags=plural(flagged, "{n} probe speaks", "{n} probes speak") if flagged else "",
         besm=measure(card.besm, sure.besm),
         sam=measure(card.sam, sure.sam),
         detection=rate_measure(card.detection_rate, sure.detection_rate),
@@ -129,8 +137,12 @@ def _row(data: SiteData, system: System, part: int) -> BoardRow:
 def _ledger_summary(data: SiteData) -> str:
     shown, there = min(len(data.ledger), SHOWN_ENTRIES), len(data.ledger)
     if shown < there:
-        return f"The last {shown} of {plural(there, 'entry', 'entries')}, newest first."
-    return f"{plural(there, 'entry', 'entries')}, newest first."
+        return ngettext(
+            "The last {shown} of {n} entry, newest first.",
+            "The last {shown} of {n} entries, newest first.",
+            there,
+        ).format(shown=shown, n=whole(there))
+    return plural(there, "{n} entry, newest first.", "{n} entries, newest first.")
 
 
 def video_href(data: SiteData, video_id: str) -> str:
@@ -142,9 +154,11 @@ def _heat_row(data: SiteData, system: System) -> HeatRow:
     cells = []
     for video_id in data.video_ids[:HEAT_VIDEOS]:
         video = system.scores[video_id]
-        _, text = verdict(video)
+        text = verdict(video)[1]
         shown = score(video.besm, video.detected, digits=2)
-        what = f"{visible(system.name)} on {visible(video_id)}: BESM {shown.text}, {text.lower()}"
+        what = _("{system} on {video}: BESM {besm}, {verdict}").format(
+            system=visible(system.name), video=visible(video_id), besm=shown.text, verdict=text.lower()
+        )
         cells.append(HeatCell(visible(video_id), video_href(data, video_id), shown, _good(video), what))
     return HeatRow(visible(system.name), system.slug, tuple(cells))
 
@@ -159,16 +173,23 @@ def _charts(data: SiteData) -> tuple[Chart, ...]:
     apart = max(abs(s.evaluation.card.besm - s.evaluation.card.sam) for s in systems)
     both = Chart(
         "besm-sam",
-        "BESM against SAM",
-        f"{visible(systems[0].name)} leads with BESM {best.besm:.4f} and SAM {best.sam:.4f}. "
-        f"The two metrics differ by at most {apart:.4f} for any system; they can differ only in videos "
-        "with three captions or more. The thin lines are the 95 % intervals.",
-        ("Submission", "BESM", "SAM", "Detection rate"),
+        _("BESM against SAM"),
+        _(
+            "{system} leads with BESM {besm} and SAM {sam}. The two metrics differ by at most {apart} for "
+            "any system; they can differ only in videos with three captions or more. The thin lines are the "
+            "95 % intervals."
+        ).format(
+            system=visible(systems[0].name),
+            besm=fixed(best.besm, 4),
+            sam=fixed(best.sam, 4),
+            apart=fixed(apart, 4),
+        ),
+        (_("Submission"), "BESM", "SAM", _("Detection rate")),
         tuple(
             (
                 visible(s.name),
-                f"{s.evaluation.card.besm:.4f}",
-                f"{s.evaluation.card.sam:.4f}",
+                fixed(s.evaluation.card.besm, 4),
+                fixed(s.evaluation.card.sam, 4),
                 percent(s.evaluation.card.detection_rate),
             )
             for s in systems
@@ -180,11 +201,17 @@ def _charts(data: SiteData) -> tuple[Chart, ...]:
     passed = sum(video.detected for video in head.evaluation.videos)
     spread = Chart(
         "distribution",
-        "How close the best caption comes",
-        f"{visible(head.name)} detects {passed} of {plural(len(head.evaluation.videos), 'video')}: above "
-        f"{data.settings.threshold:.2f}, or rightly silent, which counts as 1. Each bar counts videos by "
-        "their best similarity.",
-        ("Submission", *(f"{i / BINS:.1f}–{(i + 1) / BINS:.1f}" for i in range(BINS))),
+        _("How close the best caption comes"),
+        _(
+            "{system} detects {n} of {videos}: above {threshold}, or rightly silent, which counts as 1. Each "
+            "bar counts videos by their best similarity."
+        ).format(
+            system=visible(head.name),
+            n=passed,
+            videos=plural(len(head.evaluation.videos), "{n} video", "{n} videos"),
+            threshold=fixed(data.settings.threshold, 2),
+        ),
+        (_("Submission"), *(f"{fixed(i / BINS, 1)}–{fixed((i + 1) / BINS, 1)}" for i in range(BINS))),
         tuple((visible(s.name), *map(str, _coarse(s))) for s in systems),
     )
     return both, spread, *(chart for chart, _ in spreads(data))
@@ -214,7 +241,7 @@ def _card(data: SiteData, video_id: str) -> VideoCard:
         picture=media.card,
         picture_width=width,
         picture_height=round(width * shape),
-        alt=f"A keyframe of {shown}",
+        alt=_("A keyframe of {video}").format(video=shown),
         labels=shown,
         descriptions=(),
         best=None,
@@ -239,20 +266,20 @@ def _judged_card(data: SiteData, video_id: str, card: VideoCard) -> VideoCard:
     found = sum(_good(system.scores[video_id]) for system in data.systems)
     labels = visible(title_of(truth))
     if not hazards:
-        state, words = "clear", f"{found} of {len(data.systems)} rightly silent"
+        state, words = "clear", _("{n} of {total} rightly silent")
     else:
         state = "missed" if not found else "found" if found == len(data.systems) else "partly"
-        words = f"{found} of {len(data.systems)} detected it"
+        words = _("{n} of {total} detected it")
     descriptions = tuple(visible(hazard.description) for hazard in hazards)
     return replace(
         card,
         video_id=card.labels,
-        alt=f"{card.alt}: {labels}",
+        alt=_("A keyframe of {video}: {labels}").format(video=card.labels, labels=labels),
         labels=labels,
-        descriptions=descriptions or ("Nothing to report: silence is right here.",),
+        descriptions=descriptions or (_("Nothing to report: silence is right here."),),
         best=best,
         best_by=visible(ranked[0].name) if ranked else "",
-        found_by=words if data.systems else "",
+        found_by=words.format(n=found, total=len(data.systems)) if data.systems else "",
         state=state,
         key=" ".join([card.labels, labels, *descriptions]).casefold(),
     )

@@ -10,6 +10,8 @@ from sitegen.compare import Comparison
 from sitegen.compare_files import INDEX_FILE, short_name, shown_name, tested, tests, video_href
 from sitegen.contexts import Link, Shell
 from sitegen.gathered import SiteData, System
+from sitegen.language import fixed, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import Score, plural, rate
 from sitegen.paired import RESAMPLES
 from sitegen.score import Index, Mask
@@ -105,17 +107,18 @@ def compare_page(data: SiteData, shell: Shell) -> ComparePage:
     chosen = tested(data)
     systems = tuple(Choice(s.slug, shown_name(s), s in chosen) for s in data.systems)
     rest = len(data.systems) - len(chosen)
-    left_out = f"the {len(chosen)} best of {len(data.systems)} systems" if rest else ""
+    best_of = _("the {n} best of {total} systems").format(n=len(chosen), total=len(data.systems))
+    left_out = best_of if rest else ""
     found = np.array([[s.scores[video_id].detected for video_id in data.video_ids] for s in chosen])
     sets, more = _sets(data, chosen, found)
     return ComparePage(
         shell=shell,
         index_file=INDEX_FILE,
-        videos=plural(len(data.truth), "video"),
-        resamples=f"{RESAMPLES:,}",
+        videos=plural(len(data.truth), "{n} video", "{n} videos"),
+        resamples=whole(RESAMPLES),
         systems=systems,
         first=systems[0],
-        first_besm=f"{chosen[0].evaluation.card.besm:.4f}",
+        first_besm=fixed(chosen[0].evaluation.card.besm, 4),
         contenders=tuple(
             _contender(system, tests(chosen)[place, 0]["besm"])
             for place, system in enumerate(chosen)
@@ -124,20 +127,22 @@ def compare_page(data: SiteData, shell: Shell) -> ComparePage:
         left_out=left_out,
         counts=_counts(data, found),
         sets=sets,
-        sets_left_out=plural(more, "more set") if more else "",
+        sets_left_out=plural(more, "{n} more set", "{n} more sets") if more else "",
         matrix=_matrix(chosen, found),
     )
 
 
 def signed(value: float) -> str:
     """A difference to four digits with its sign; none for what rounds to zero."""
-    text = f"{value:+.4f}"
-    return "0.0000" if float(text) == 0 else text.replace("-", "−")
+    size = fixed(abs(value), 4)
+    if round(abs(value), 4) == 0:
+        return size
+    return f"{'+' if value > 0 else '−'}{size}"
 
 
 def p_text(p: float) -> str:
     """A p-value to three digits."""
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+    return f"< {fixed(0.001, 3)}" if p < 0.001 else fixed(p, 3)
 
 
 def _contender(system: System, found: Comparison) -> Contender:
@@ -145,14 +150,14 @@ def _contender(system: System, found: Comparison) -> Contender:
     return Contender(
         slug=system.slug,
         name=shown_name(system),
-        besm=f"{found.a:.4f}",
+        besm=fixed(found.a, 4),
         difference=signed(found.difference),
-        interval=f"{signed(ends.low)} to {signed(ends.high)}",
+        interval=_("{low} to {high}").format(low=signed(ends.low), high=signed(ends.high)),
         p=p_text(found.p_randomisation),
-        apart="yes" if found.p_randomisation < SIGNIFICANT else "no",
-        better=f"{found.wins:,}",
-        worse=f"{found.losses:,}",
-        equal=f"{found.ties:,}",
+        apart=_("yes") if found.p_randomisation < SIGNIFICANT else _("no"),
+        better=whole(found.wins),
+        worse=whole(found.losses),
+        equal=whole(found.ties),
     )
 
 
@@ -162,8 +167,8 @@ def _counts(data: SiteData, found: Mask) -> tuple[Solved, ...]:
     by: Index = found.sum(axis=0)
     rows = []
     for number in range(n_systems, -1, -1):
-        name = f"{number} of {n_systems}"
-        name = {n_systems: f"all {n_systems}", 0: "none"}.get(number, name)
+        name = _("{n} of {total}") if number else _("none")
+        name = (_("all {total}") if number == n_systems else name).format(n=number, total=n_systems)
         rows.append(_solved(data, name, np.flatnonzero(by == number)))
     return tuple(rows)
 

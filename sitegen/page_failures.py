@@ -18,10 +18,11 @@ from sitegen.failure_files import (
     system_name,
     units,
 )
-from sitegen.failures import NAMES, SENTENCES, Blame, Failure, FailureKind, FunnelStep
+from sitegen.failures import Blame, Failure, FailureKind, FunnelStep, meaning_of, name_of
 from sitegen.gathered import SiteData, System
+from sitegen.language import N_, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import Score, number, plural, score
-from sitegen.verdicts import NO_HAZARD
 from sitegen.words import shorten
 
 FIRST = 50
@@ -29,14 +30,14 @@ CHARTS, MORE_CHARTS = 3, 9
 """So many systems have their funnel drawn in sight, and so many more when asked; the table has all."""
 
 STAGE_NAMES = {
-    "truth": "In the truth",
-    "seen": "Seen",
-    "ranked": "Ranked",
-    "merged": "Merged",
-    "anomalous": "Anomalous",
-    "matched": "Matched",
+    "truth": N_("In the truth"),
+    "seen": N_("Seen"),
+    "ranked": N_("Ranked"),
+    "merged": N_("Merged"),
+    "anomalous": N_("Anomalous"),
+    "matched": N_("Matched"),
 }
-NOT_RECORDED = "not recorded"
+NOT_RECORDED = N_("not recorded")
 
 _ROW, _BAR, _LEFT, _FULL = 28, 18, 92, 196  # of a funnel, in viewBox units
 
@@ -145,20 +146,25 @@ def failures_page(data: SiteData, blames: Mapping[str, Blame], shell: Shell) -> 
     return FailuresPage(
         shell=shell,
         index_file=INDEX_FILE if total else "",
-        summary=f"{plural(total, 'failure')} of {plural(len(lines), 'system')} "
-        f"in {plural(len(data.truth), 'video')}",
+        summary=_("{failures} of {systems} in {videos}").format(
+            failures=plural(total, "{n} failure", "{n} failures"),
+            systems=plural(len(lines), "{n} system", "{n} systems"),
+            videos=plural(len(data.truth), "{n} video", "{n} videos"),
+        ),
         threshold_share=round(data.settings.threshold * 100),
         total=total,
         kinds=tuple(
-            KindView(NAMES[kind], SENTENCES[kind], _cell(everywhere[kind], kind=kind.value))
+            KindView(name_of(kind), meaning_of(kind), _cell(everywhere[kind], kind=kind.value))
             for kind in FailureKind
         ),
         systems=lines,
-        stages=tuple(STAGE_NAMES.values()),
+        stages=tuple(map(_, STAGE_NAMES.values())),
         funnels=drawn[:CHARTS],
         more_funnels=drawn[CHARTS:],
         first=first,
-        more=plural(total - len(first), "more failure") if total > len(first) else "",
+        more=plural(total - len(first), "{n} more failure", "{n} more failures")
+        if total > len(first)
+        else "",
     )
 
 
@@ -169,9 +175,13 @@ def _cell(count: int, **wanted: str) -> KindCell:
 def _line(system: System, counts: Counter[FailureKind], funnel: Sequence[FunnelStep]) -> SystemLine:
     cells = tuple(_cell(counts[kind], kind=kind.value, system=system.slug) for kind in FailureKind)
     alive = {step.stage: step.alive for step in funnel}
-    texts = tuple(NOT_RECORDED if alive.get(s) is None else f"{alive[s]:,}" for s in STAGE_NAMES)
+    texts = tuple(_alive(alive.get(stage)) for stage in STAGE_NAMES)
     total = _cell(counts.total(), system=system.slug)
     return SystemLine(system.slug, system_name(system), total, cells, texts)
+
+
+def _alive(count: int | None) -> str:
+    return _(NOT_RECORDED) if count is None else whole(count)
 
 
 def _funnel(system: System, funnel: Sequence[FunnelStep]) -> Funnel:
@@ -187,23 +197,23 @@ def _funnel(system: System, funnel: Sequence[FunnelStep]) -> Funnel:
         width, shadow = (_FULL * value / full if full else 0.0 for value in (kept, before))
         bars.append(
             FunnelBar(
-                name=name,
+                name=_(name),
                 y=number(place * _ROW),
                 text_y=number(place * _ROW + _BAR / 2 + 4),
                 before=number(shadow),
                 alive=number(width),
                 text_x=number(_LEFT + (0.0 if now is None else shadow) + 6),
-                text=NOT_RECORDED if now is None else f"{now:,}",
-                lost=f"−{lost:,}" if lost > 0 else "",
+                text=_alive(now),
+                lost=f"−{whole(lost)}" if lost > 0 else "",
                 recorded=now is not None,
             )
         )
         if stage != "truth":
-            words.append(f"{name.lower()} {NOT_RECORDED if now is None else f'{now:,}'}")
+            words.append(f"{_(name).lower()} {_alive(now)}")
         before = kept
-    return Funnel(
-        system.slug, system_name(system), f"Of {plural(full, 'hazard')}: {', '.join(words)}.", tuple(bars)
-    )
+    hazards = plural(full, "{n} hazard", "{n} hazards")
+    summary = _("Of {hazards}: {stages}.").format(hazards=hazards, stages=", ".join(words))
+    return Funnel(system.slug, system_name(system), summary, tuple(bars))
 
 
 def _first(data: SiteData, found: Shown) -> Iterator[FirstFailure]:
@@ -216,7 +226,7 @@ def _first(data: SiteData, found: Shown) -> Iterator[FirstFailure]:
     by_video: dict[str, list[Hazard]] = {}
     for hazard in found.hazards:
         by_video.setdefault(hazard.video_id, []).append(hazard)
-    for _, place, _, failure in nsmallest(FIRST, everything, key=lambda row: row[:3]):
+    for _units, place, _n, failure in nsmallest(FIRST, everything, key=lambda row: row[:3]):
         hazards = [
             hazard
             for hazard in by_video.get(failure.video_id, ())
@@ -229,13 +239,13 @@ def _first_failure(
     data: SiteData, system: System, failure: Failure, hazards: Sequence[Hazard]
 ) -> FirstFailure:
     video = shown_id(failure.video_id)
-    labels = shorten(", ".join(hazard.label for hazard in hazards), 80) or NO_HAZARD
+    labels = shorten(", ".join(hazard.label for hazard in hazards), 80) or _("No hazard")
     return FirstFailure(
         href=f"videos/{data.names[failure.video_id]}.html#{system.slug}",
         video=video,
         picture=data.media[failure.video_id].card,
-        alt=f"A keyframe of {video}: {labels}",
-        kind=NAMES[failure.kind],
+        alt=_("A keyframe of {video}: {labels}").format(video=video, labels=labels),
+        kind=name_of(failure.kind),
         system=system_name(system),
         truth=tuple((hazard.label, hazard.description) for hazard in hazards),
         caption=caption_of(system, failure),

@@ -3,34 +3,39 @@
 from pipeline.prompts import templates
 from sitegen.blocks import blocks
 from sitegen.contexts import MethodPage, ModelView, PromptView, Shell
-from sitegen.failures import NAMES, SENTENCES, FailureKind
+from sitegen.failures import FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData
 from sitegen.judgements import agreement_table
-from sitegen.mentions import RULE
+from sitegen.language import N_, fixed, said_again
+from sitegen.language import gettext as _
+from sitegen.mentions import rule
 from sitegen.words import visible
 
 MODELS = (
     ModelView(
-        "Text embedder", "all-MiniLM-L6-v2, fp32", "Apache-2.0", "Scores every caption; part of the signature"
-    ),
-    ModelView("Noun chunks", "spaCy en_core_web_sm", "MIT", "Track 2: elements in the answers"),
-    ModelView(
-        "Vision agent (baseline)",
-        "EfficientNet-Lite0 on box crops, with the tracks' motion",
+        N_("Text embedder"),
+        "all-MiniLM-L6-v2, fp32",
         "Apache-2.0",
-        "Stands in for the paper's vision-language models; works without a network",
+        N_("Scores every caption; part of the signature"),
+    ),
+    ModelView(N_("Noun chunks"), "spaCy en_core_web_sm", "MIT", N_("Track 2: elements in the answers")),
+    ModelView(
+        N_("Vision agent (baseline)"),
+        N_("EfficientNet-Lite0 on box crops, with the tracks' motion"),
+        "Apache-2.0",
+        N_("Stands in for the paper's vision-language models; works without a network"),
     ),
     ModelView(
-        "Language agent (baseline)",
-        "Fixed rules over spaCy and the embedder",
-        "MIT (this project)",
-        "Stands in for the paper's language model; same input, same output",
+        N_("Language agent (baseline)"),
+        N_("Fixed rules over spaCy and the embedder"),
+        N_("MIT (this project)"),
+        N_("Stands in for the paper's language model; same input, same output"),
     ),
     ModelView(
-        "Image-text matcher (baseline)",
-        "ConSE: the classifier's classes, averaged as text",
-        "Apache-2.0 weights",
-        "Stands in for CLIP in the verification",
+        N_("Image-text matcher (baseline)"),
+        N_("ConSE: the classifier's classes, averaged as text"),
+        N_("Apache-2.0 weights"),
+        N_("Stands in for CLIP in the verification"),
     ),
 )
 
@@ -45,25 +50,34 @@ find . -type f ! -name '.*' | sed 's|^./||' | while read -r f; do
 done | LC_ALL=C sort | sha256sum"""
 
 PROBES = {
-    "constant": ("Constant caption", "Of the videos with captions, how many get the most common one"),
-    "word-bag": ("Bag of common words", "How many captions string common words together without a sentence"),
-    "shuffled": ("Shuffled videos", "How much of BESM is left when every video has the captions of others"),
-    "stuffing": ("Many captions a video", "How many captions a video with captions has on average"),
-    "near-copy": ("Near copy", "In how many videos another submission has the same captions, or nearly"),
+    "constant": (N_("Constant caption"), N_("Of the videos with captions, how many get the most common one")),
+    "word-bag": (
+        N_("Bag of common words"),
+        N_("How many captions string common words together without a sentence"),
+    ),
+    "shuffled": (
+        N_("Shuffled videos"),
+        N_("How much of BESM is left when every video has the captions of others"),
+    ),
+    "stuffing": (N_("Many captions a video"), N_("How many captions a video with captions has on average")),
+    "near-copy": (
+        N_("Near copy"),
+        N_("In how many videos another submission has the same captions, or nearly"),
+    ),
     "truth-copy": (
-        "The truth's own words",
-        "How many hazards are described in exactly the words of the truth",
+        N_("The truth's own words"),
+        N_("How many hazards are described in exactly the words of the truth"),
     ),
 }
 
 SIGNATURE_PARTS = (
-    ("coooler", "version of the metric's definition"),
-    ("emb", "the embedding model and the hash of its weights and tokenizer"),
-    ("truth", "hash of the truth's content, whatever its file format"),
-    ("n", "number of videos in the truth: every mean is over all of them"),
-    ("thr", "a caption detects its hazard when its similarity is above this"),
-    ("nohaz", "rule for a video without a hazard: 1 for silence, 0 for any caption"),
-    ("clip", "each pair's cosine is clipped to 0–1 before any mean"),
+    ("coooler", N_("version of the metric's definition")),
+    ("emb", N_("the embedding model and the hash of its weights and tokenizer")),
+    ("truth", N_("hash of the truth's content, whatever its file format")),
+    ("n", N_("number of videos in the truth: every mean is over all of them")),
+    ("thr", N_("a caption detects its hazard when its similarity is above this")),
+    ("nohaz", N_("rule for a video without a hazard: 1 for silence, 0 for any caption")),
+    ("clip", N_("each pair's cosine is clipped to 0–1 before any mean")),
 )
 
 
@@ -74,7 +88,7 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
         PromptView(name, part["section"], part["system"], part["user"], part["format_hint"])
         for name, part in templates().items()
     )
-    systems = tuple((visible(s.name), s.slug, visible(s.agents)) for s in data.systems)
+    systems = tuple((visible(s.name), s.slug, visible(said_again(s.agents))) for s in data.systems)
     attribution = blocks("\n".join(visible(line) for line in data.attribution.splitlines()))
     if attribution and attribution[0].kind == "heading":
         attribution = attribution[1:]
@@ -83,18 +97,18 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
     return MethodPage(
         shell,
         data.hidden,
-        f"{data.settings.threshold:.2f}",
+        fixed(data.settings.threshold, 2),
         signature,
         _probes(data),
-        SIGNATURE_PARTS,
+        tuple((part, _(meaning)) for part, meaning in SIGNATURE_PARTS),
         prompts,
-        MODELS,
+        tuple(ModelView(_(row.part), _(row.name), _(row.licence), _(row.role)) for row in MODELS),
         systems,
         attribution[:cut],
         attribution[cut:],
         agreement_table(data.votes, {system.slug: system.evaluation for system in data.systems}),
-        RULE,
-        tuple((NAMES[kind], SENTENCES[kind]) for kind in FailureKind),
+        rule(),
+        tuple((name_of(kind), meaning_of(kind)) for kind in FailureKind),
         VERIFY,
     )
 
@@ -102,4 +116,7 @@ def method_page(data: SiteData, shell: Shell) -> MethodPage:
 def _probes(data: SiteData) -> tuple[tuple[str, str, str], ...]:
     """Each probe's name, what it measures, and from where on it speaks."""
     thresholds = {probe.kind: probe.threshold_text for system in data.systems for probe in system.probes}
-    return tuple((name, meaning, thresholds.get(kind, "–")) for kind, (name, meaning) in PROBES.items())
+    return tuple(
+        (_(name), _(meaning), said_again(thresholds.get(kind, "–")))
+        for kind, (name, meaning) in PROBES.items()
+    )

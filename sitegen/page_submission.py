@@ -5,8 +5,10 @@ from collections.abc import Iterable, Sequence
 
 from pipeline.records import UsageRow
 from sitegen.contexts import Fact, Shell
-from sitegen.failures import NAMES, SENTENCES, FailureKind
+from sitegen.failures import FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData, System
+from sitegen.language import N_, fixed, grouped, ngettext, said_again, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import percent, plural, score
 from sitegen.probes import Probe
 from sitegen.submission_contexts import (
@@ -24,6 +26,8 @@ from sitegen.words import shorten, visible
 EXTREMES = 3
 SHOWN_CAPTIONS = 5
 
+_VERDICTS = {"unsaid": N_("cannot be said"), "speaks": N_("speaks"), "quiet": N_("quiet")}
+
 
 def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionPage:
     """The context of submissions/<slug>.html."""
@@ -33,15 +37,17 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
     return SubmissionPage(
         shell=shell,
         name=visible(system.name),
-        agents=visible(system.agents),
+        agents=visible(said_again(system.agents)),
         is_baseline=system.is_baseline,
         is_rehearsed=system.rehearsed,
         hidden=data.hidden,
-        rank_text=f"Rank {rank_text(data, system)} of {len(data.systems)}",
+        rank_text=_("Rank {rank} of {n}").format(rank=rank_text(data, system), n=len(data.systems)),
         standing=_standing(data, system),
         cards=_scorecard(data, system),
         probes=tuple(map(_probe_line, system.probes)),
-        probes_summary=plural(flagged, "probe speaks", "probes speak") if flagged else "No probe speaks",
+        probes_summary=plural(flagged, "{n} probe speaks", "{n} probes speak")
+        if flagged
+        else _("No probe speaks"),
         failures=_failures(system),
         lines=tuple(_line(data, system, video_id) for video_id in data.video_ids),
         best=best,
@@ -50,7 +56,7 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
         ledger=tuple(ledger_line(data, entry) for entry in system.history),
         warnings=tuple(visible(warning) for warning in submission.warnings),
         signature=str(system.evaluation.card.signature),
-        threshold=f"{data.settings.threshold:.2f}",
+        threshold=fixed(data.settings.threshold, 2),
     )
 
 
@@ -59,7 +65,7 @@ def _failures(system: System) -> tuple[KindCount, ...]:
     counts = Counter(failure.kind for failure in system.blame.failures) if system.blame else Counter()
     address = f"failures.html?system={system.slug}&kind="
     return tuple(
-        KindCount(NAMES[kind], counts[kind], f"{address}{kind}", SENTENCES[kind])
+        KindCount(name_of(kind), counts[kind], f"{address}{kind}", meaning_of(kind))
         for kind in FailureKind
         if counts[kind]
     )
@@ -68,60 +74,73 @@ def _failures(system: System) -> tuple[KindCount, ...]:
 def _scorecard(data: SiteData, system: System) -> tuple[Fact, ...]:
     card, sure = system.evaluation.card, system.uncertainty
     predictions = system.evaluation.submission.predictions
-    recall = "none to find" if card.hazard_recall is None else percent(card.hazard_recall)
+    recall = _("none to find") if card.hazard_recall is None else percent(card.hazard_recall)
     found = sum(video.n_hazards_found for video in system.evaluation.videos)
     hazards = sum(video.n_hazards for video in system.evaluation.videos)
     facts = [
-        Fact("BESM", f"{card.besm:.4f}", note=_means(sure.besm)),
-        Fact("SAM", f"{card.sam:.4f}", note=_means(sure.sam)),
-        Fact("Detection rate", percent(card.detection_rate), note=_shares(sure.detection_rate)),
-        Fact("Hazard recall", recall, note=_shares(sure.hazard_recall) if sure.hazard_recall else ""),
-        Fact("Videos detected", f"{round(card.detection_rate * card.n_videos)} of {card.n_videos}"),
-        Fact("Hazards found", f"{found} of {hazards}"),
-        Fact("Videos with captions", f"{len({row.video_id for row in predictions})} of {card.n_videos}"),
-        Fact("Captions", f"{len(predictions):,}"),
+        Fact("BESM", fixed(card.besm, 4), note=_means(sure.besm)),
+        Fact("SAM", fixed(card.sam, 4), note=_means(sure.sam)),
+        Fact(_("Detection rate"), percent(card.detection_rate), note=_shares(sure.detection_rate)),
+        Fact(_("Hazard recall"), recall, note=_shares(sure.hazard_recall) if sure.hazard_recall else ""),
     ]
-    of_truth = {"Videos detected", "Hazards found"} if data.hidden else set()
-    return tuple(fact for fact in facts if fact.name not in of_truth)
+    if not data.hidden:
+        detected = round(card.detection_rate * card.n_videos)
+        facts += [
+            Fact(_("Videos detected"), _of(detected, card.n_videos)),
+            Fact(_("Hazards found"), _of(found, hazards)),
+        ]
+    said = len({row.video_id for row in predictions})
+    facts += [
+        Fact(_("Videos with captions"), _of(said, card.n_videos)),
+        Fact(_("Captions"), whole(len(predictions))),
+    ]
+    return tuple(facts)
+
+
+def _of(count: int, total: int) -> str:
+    return _("{n} of {total}").format(n=count, total=total)
 
 
 def _means(interval: Interval) -> str:
-    return f"{interval.low:.4f} to {interval.high:.4f}"
+    return _("{low} to {high}").format(low=fixed(interval.low, 4), high=fixed(interval.high, 4))
 
 
 def _shares(interval: Interval) -> str:
-    return f"{interval.low * 100:.1f} to {percent(interval.high)}"
+    return _("{low} to {high}").format(low=fixed(interval.low * 100, 1), high=percent(interval.high))
 
 
 def _standing(data: SiteData, system: System) -> tuple[str, ...]:
     """The rank band and its stability in words."""
     others = sum(other.rank == system.rank for other in data.systems) - 1
-    videos = plural(len(data.truth), "video")
+    videos = plural(len(data.truth), "{n} video", "{n} videos")
     if others:
-        band = (
-            f"Rank {system.rank}, shared with {plural(others, 'other')}: over these {videos}, none of "
-            "them can be told apart from the best of them."
-        )
+        band = ngettext(
+            "Rank {rank}, shared with {n} other: over these {videos}, none of them can be told apart from "
+            "the best of them.",
+            "Rank {rank}, shared with {n} others: over these {videos}, none of them can be told apart from "
+            "the best of them.",
+            others,
+        ).format(rank=system.rank, n=whole(others), videos=videos)
     else:
-        band = f"Rank {system.rank}, shared with no other."
+        band = _("Rank {rank}, shared with no other.").format(rank=system.rank)
     if system.rank != system.place:
-        band += f" By BESM alone it is number {system.place}."
-    drawn = (
-        f"With the {videos} drawn again 1,000 times, its rank is {ranks_text(system)} in 95 % of the draws, "
-        f"and it is first in {first_share(system).text} of them."
+        band += " " + _("By BESM alone it is number {place}.").format(place=system.place)
+    drawn = _(
+        "With the {videos} drawn again 1,000 times, its rank is {ranks} in 95 % of the draws, and it is "
+        "first in {share} of them."
     )
-    return band, drawn
+    return band, drawn.format(videos=videos, ranks=ranks_text(system), share=first_share(system).text)
 
 
 def _probe_line(probe: Probe) -> ProbeLine:
     verdict = "unsaid" if probe.value is None else "speaks" if probe.flagged else "quiet"
     return ProbeLine(
-        name=probe.name,
-        sentence=visible(probe.sentence),
-        value=visible(probe.text),
-        threshold=probe.threshold_text,
+        name=_(probe.name),
+        sentence=visible(said_again(probe.sentence)),
+        value=visible(said_again(probe.text)),
+        threshold=said_again(probe.threshold_text),
         verdict=verdict,
-        verdict_text="cannot be said" if probe.value is None else verdict,
+        verdict_text=_(_VERDICTS[verdict]),
     )
 
 
@@ -129,7 +148,7 @@ def _line(data: SiteData, system: System, video_id: str) -> VideoLine:
     rows = system.predictions.get(video_id, [])
     captions = [visible(shorten(row.description, 200)) for row in rows[:SHOWN_CAPTIONS]]
     if len(rows) > SHOWN_CAPTIONS:
-        captions.append(f"and {plural(len(rows) - SHOWN_CAPTIONS, 'more', 'more')}")
+        captions.append(plural(len(rows) - SHOWN_CAPTIONS, "and {n} more", "and {n} more"))
     return VideoLine(
         visible(video_id),
         f"videos/{data.names[video_id]}.html#{system.slug}",
@@ -173,7 +192,7 @@ def _views(data: SiteData, system: System, video_ids: Sequence[str]) -> tuple[Ex
                 visible(video_id),
                 f"videos/{data.names[video_id]}.html#{system.slug}",
                 data.media[video_id].card,
-                f"A keyframe of {visible(video_id)}",
+                _("A keyframe of {video}").format(video=visible(video_id)),
                 visible(shorten(words[pair.hazard_id], 200)),
                 visible(shorten(said[pair.prediction_rank], 200)),
                 score(video.best, video.detected, digits=2),
@@ -186,16 +205,16 @@ def _provenance(system: System) -> tuple[Fact, ...]:
     submission = system.evaluation.submission
     url = submission.url if submission.url.startswith(("https://", "http://")) else ""
     facts = [
-        Fact("Authors", visible(submission.authors)),
-        Fact("Address", visible(submission.url), href=url),
-        Fact("Date", visible(submission.date)),
-        Fact("Licence", visible(system.licence)),
-        Fact("Notes", visible(system.notes)),
-        Fact("Format", visible(submission.source_format)),
-        Fact("Agents", visible(system.agents)),
-        Fact("Cost of the run", _cost(system.usage)),
+        Fact(_("Authors"), visible(submission.authors)),
+        Fact(_("Address"), visible(submission.url), href=url),
+        Fact(_("Date"), visible(submission.date)),
+        Fact(_("Licence"), visible(system.licence)),
+        Fact(_("Notes"), visible(system.notes)),
+        Fact(_("Format"), visible(submission.source_format)),
+        Fact(_("Agents"), visible(said_again(system.agents))),
+        Fact(_("Cost of the run"), _cost(system.usage)),
     ]
-    facts += [Fact(name, visible(value), code=True) for name, value in system.facts]
+    facts += [Fact(_(name), visible(value), code=True) for name, value in system.facts]
     return tuple(fact for fact in facts if fact.value)
 
 
@@ -204,20 +223,21 @@ def _cost(usage: Sequence[UsageRow]) -> str:
     if not usage:
         return ""
     models = sorted({visible(row.model) for row in usage if row.model})
-    parts = [plural(sum(row.calls for row in usage), "call")]
+    parts = [plural(sum(row.calls for row in usage), "{n} call", "{n} calls")]
     if models:
-        parts[0] += f" of {shorten(', '.join(models), 200)}"
-    parts += _total([row.input_tokens for row in usage], "{:,.0f} tokens in")
-    parts += _total([row.output_tokens for row in usage], "{:,.0f} tokens out")
-    parts += _total([row.seconds for row in usage], "{:,.1f} seconds of answering")
-    parts += _total([row.cost for row in usage], "a price of {:,.4f}")
+        parts[0] = _("{calls} of {models}").format(calls=parts[0], models=shorten(", ".join(models), 200))
+    parts += _total([row.input_tokens for row in usage], _("{total} tokens in"), 0)
+    parts += _total([row.output_tokens for row in usage], _("{total} tokens out"), 0)
+    parts += _total([row.seconds for row in usage], _("{total} seconds of answering"), 1)
+    parts += _total([row.cost for row in usage], _("a price of {total}"), 4)
     return "; ".join(parts)
 
 
-def _total(values: Iterable[float | None], words: str) -> list[str]:
+def _total(values: Iterable[float | None], words: str, digits: int) -> list[str]:
     """The sum of what was counted, in words; nothing when nothing was."""
     every = list(values)
     known = [value for value in every if value is not None]
     if not known:
         return []
-    return [f"{'at least ' if len(known) < len(every) else ''}{words.format(sum(known))}"]
+    total = words.format(total=grouped(sum(known), digits))
+    return [total if len(known) == len(every) else _("at least {total}").format(total=total)]

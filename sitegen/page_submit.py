@@ -13,6 +13,8 @@ from sitegen.checks import MAX_ID_CHARS, MAX_LIST_ITEMS, MAX_TEXT_CHARS
 from sitegen.contexts import Shell
 from sitegen.formats import MAX_BYTES
 from sitegen.gathered import SiteData
+from sitegen.language import N_, whole
+from sitegen.language import gettext as _
 from sitegen.readers import PREDICTION_COLUMNS
 
 TRUTH_FILE = "data/submit.js"
@@ -47,23 +49,27 @@ class SubmitPage:
     sample_file: str
 
 
+_LIMITS = {"video_id": MAX_ID_CHARS, "description": MAX_TEXT_CHARS, "track_ids": MAX_LIST_ITEMS}
+
 COLUMNS = (
-    ColumnView("video_id", True, f"One of the benchmark's video ids, {MAX_ID_CHARS} characters at most.", ""),
-    ColumnView("rank", True, "1, 2, 3, … in each video; each number once. 1 is what you are surest of.", "1"),
+    ColumnView("video_id", True, N_("One of the benchmark's video ids, {limit} characters at most."), ""),
+    ColumnView(
+        "rank", True, N_("1, 2, 3, … in each video; each number once. 1 is what you are surest of."), "1"
+    ),
     ColumnView(
         "description",
         True,
-        f"What the hazard is, in words: 1 to {MAX_TEXT_CHARS:,} characters.",
+        N_("What the hazard is, in words: 1 to {limit} characters."),
         "A cat crosses the road",
     ),
-    ColumnView("label", False, "The hazard in a word or two.", "cat"),
+    ColumnView("label", False, N_("The hazard in a word or two."), "cat"),
     ColumnView(
         "track_ids",
         False,
-        f"The tracks of its boxes: a JSON list, or ids between semicolons; {MAX_LIST_ITEMS:,} at most.",
+        N_("The tracks of its boxes: a JSON list, or ids between semicolons; {limit} at most."),
         "7;9",
     ),
-    ColumnView("frame_indices", False, "The frames it is seen in, from 0; a list as before.", "[12, 13]"),
+    ColumnView("frame_indices", False, N_("The frames it is seen in, from 0; a list as before."), "[12, 13]"),
 )
 
 
@@ -71,13 +77,19 @@ def submit_page(data: SiteData, shell: Shell) -> SubmitPage:
     """The context of submit.html."""
     return SubmitPage(
         shell=shell,
-        columns=(replace(COLUMNS[0], example=data.video_ids[0]), *COLUMNS[1:]),
-        n_videos=f"{len(data.truth):,}",
+        columns=tuple(_in_words(column, data.video_ids[0]) for column in COLUMNS),
+        n_videos=whole(len(data.truth)),
         limit=f"{MAX_BYTES // 2**20} MB",
         hidden=data.hidden,
         truth_file=TRUTH_FILE,
         sample_file=SAMPLE_FILE,
     )
+
+
+def _in_words(column: ColumnView, video_id: str) -> ColumnView:
+    """The column in the page's language; of the column of ids, the first one is the example."""
+    meaning = _(column.meaning).format(limit=whole(_LIMITS.get(column.name, 0)))
+    return replace(column, meaning=meaning, example=video_id if column.name == "video_id" else column.example)
 
 
 def submit_files(data: SiteData) -> Iterator[tuple[str, bytes]]:

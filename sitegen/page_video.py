@@ -9,9 +9,12 @@ from operator import attrgetter
 from pipeline.records import Kind, TrackBox, TruthHazard
 from pipeline.scores import VideoScore
 from sitegen.contexts import Fact, Link, Shell
-from sitegen.failures import NAMES, SENTENCES, Blame, Failure, FailureKind
+from sitegen.failures import Blame, Failure, FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData, System, VideoMedia
+from sitegen.language import fixed, said_again, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import number, score, seconds
+from sitegen.page_restoration import restored_href
 from sitegen.verdicts import best_pairs, cosine_score, title_of, verdict
 from sitegen.video_contexts import (
     CaptionView,
@@ -62,13 +65,14 @@ def video_page(
         heading=visible(video_id if data.hidden else title_of(truth)),
         facts=_facts(data, media, boxes),
         truth=truth_views,
-        problem=visible(media.problem),
+        problem=visible(_(media.problem)),
         note=visible(media.note),
         width=media.width_px,
         height=media.height_px,
         frames=frames,
         cover=frames[media.cover] if frames else None,
         clip=media.clip,
+        restored=restored_href(data, video_id),
         tracks=tracks if any(frame.boxes for frame in frames) else (),
         tracks_text=tracks_text(tracks),
         crops=_crops(data, video_id, media, labels),
@@ -77,7 +81,7 @@ def video_page(
         matrix=_matrix(data, video_id, hazards),
         transcripts=tuple(transcripts),
         unrecorded=", ".join(unrecorded),
-        threshold=f"{data.settings.threshold:.2f}",
+        threshold=fixed(data.settings.threshold, 2),
         threshold_share=round(data.settings.threshold * 100),
         label_px=number(label_px(media)),
         previous=place.before,
@@ -89,24 +93,27 @@ def video_page(
 def _facts(data: SiteData, media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[Fact, ...]:
     facts = []
     if media.frame_count:
-        length = seconds(media.frame_count / media.fps_hz) if media.fps_hz else "unknown"
+        length = seconds(media.frame_count / media.fps_hz) if media.fps_hz else _("unknown")
         facts = [
-            Fact("Length", length),
-            Fact("Frames", f"{media.frame_count:,} at {media.fps_hz:g} per second"),
-            Fact("Size", f"{media.width_px} × {media.height_px} px"),
+            Fact(_("Length"), length),
+            Fact(
+                _("Frames"),
+                _("{n} at {rate} per second").format(n=whole(media.frame_count), rate=f"{media.fps_hz:g}"),
+            ),
+            Fact(_("Size"), f"{media.width_px} × {media.height_px} px"),
         ]
-    facts.append(Fact("Keyframes", str(len(media.frames))))
+    facts.append(Fact(_("Keyframes"), str(len(media.frames))))
     if not data.hidden:
-        facts.append(Fact("Tracks on them", tracks_text(chips(boxes, {}))))
+        facts.append(Fact(_("Tracks on them"), tracks_text(chips(boxes, {}))))
     return tuple(facts)
 
 
 def _truth_view(hazard: TruthHazard) -> TruthView:
     where = []
     if hazard.track_id:
-        where.append(f"track {visible(hazard.track_id)}")
+        where.append(_("track {track}").format(track=visible(hazard.track_id)))
     if hazard.first_frame is not None and hazard.last_frame is not None:
-        where.append(f"frames {hazard.first_frame} to {hazard.last_frame}")
+        where.append(_("frames {first} to {last}").format(first=hazard.first_frame, last=hazard.last_frame))
     return TruthView(
         visible(hazard.hazard_id), visible(hazard.label), visible(hazard.description), ", ".join(where)
     )
@@ -126,7 +133,7 @@ def _crops(
             if match.detected and match.in_aos:
                 blamed.add(match.track_id)
         for track_id, (cosine, label) in best.items():
-            line = f"{visible(system.name)}: {shorten(visible(label), 40)} ({cosine:.2f})"
+            line = f"{visible(system.name)}: {shorten(visible(label), 40)} ({fixed(cosine, 2)})"
             seen.setdefault(track_id, []).append(line)
     views = []
     shown: set[str] = set()
@@ -134,7 +141,9 @@ def _crops(
         hazard = crop.kind is Kind.CHALLENGE
         if not hazard and crop.track_id not in blamed:
             continue
-        kind = "Hazard" if hazard else "Traffic"
+        alt = _("Traffic track {track}, cut from frame {n}")
+        if hazard:
+            alt = _("Hazard track {track}, cut from frame {n}")
         first = crop.track_id not in shown
         shown.add(crop.track_id)
         views.append(
@@ -142,7 +151,7 @@ def _crops(
                 crop.path,
                 crop.picture_width_px,
                 crop.picture_height_px,
-                f"{kind} track {named_track(crop.track_id, labels)}, cut from frame {crop.frame_index}",
+                alt.format(track=named_track(crop.track_id, labels), n=crop.frame_index),
                 visible(crop.track_id),
                 shorten(visible(crop.track_id), 24),
                 hazard,
@@ -179,21 +188,21 @@ def _system_view(
                 ", ".join(visible(track) for track in row.track_ids),
                 visible(pair.hazard_id) if pair else "",
                 cosine_score(pair, data.settings.threshold) if pair else None,
-                "" if pair or data.hidden else "The truth has no hazard here: a false alarm.",
-                NAMES[fault.kind] if fault else "",
-                SENTENCES[fault.kind] if fault else "",
+                "" if pair or data.hidden else _("The truth has no hazard here: a false alarm."),
+                name_of(fault.kind) if fault else "",
+                meaning_of(fault.kind) if fault else "",
                 difference(visible(words[pair.hazard_id]), text) if pair else (),
             )
         )
-    empty = "This system said nothing here."
+    empty = _("This system said nothing here.")
     if not data.hidden:
-        right = "This system described no hazard here, which is right."
-        silent = "This system described no hazard here; the video counts as 0 for it."
+        right = _("This system described no hazard here, which is right.")
+        silent = _("This system described no hazard here; the video counts as 0 for it.")
         empty = silent if hazards else right
     return SystemView(
         system.slug,
         visible(system.name),
-        visible(system.agents),
+        visible(said_again(system.agents)),
         system.is_baseline,
         None if data.hidden else _result(system.scores[video_id]),
         tuple(captions),
@@ -221,7 +230,7 @@ def _fates(
     for made in transcripts:
         if made.slug == system.slug:
             stages = {stage.code: stage.name for stage in made.stages}
-            stages |= {"verify": "Verification"} if made.tracks_summary else {}
+            stages |= {"verify": _("Verification")} if made.tracks_summary else {}
     views = []
     for hazard in hazards:
         name = visible(hazard.label) or shorten(visible(hazard.description), 40)
@@ -233,7 +242,7 @@ def _fates(
             continue
         place, title = _where_lost(system.slug, failure, stages)
         evidence = visible(failure.evidence)
-        views.append(FailureView(name, False, best, NAMES[failure.kind], evidence, place, title))
+        views.append(FailureView(name, False, best, name_of(failure.kind), evidence, place, title))
     return tuple(views)
 
 
@@ -253,7 +262,7 @@ def _where_lost(slug: str, failure: Failure, stages: Mapping[str, str]) -> tuple
     if code in stages:
         return f"{slug}-{code}", stages[code]
     if failure.prediction_rank is not None:
-        return f"{slug}-caption-{failure.prediction_rank}", f"Caption {failure.prediction_rank}"
+        return f"{slug}-caption-{failure.prediction_rank}", _("Caption {n}").format(n=failure.prediction_rank)
     return "", ""
 
 

@@ -70,8 +70,13 @@ def vote_page(data: SiteData, shell: Shell) -> VotePage:
     choices = sum(one.choices for one in found)
     if not choices:
         return VotePage(shell, "", "", "", "")
-    systems, videos = plural(len(voted_on(data)), "system"), plural(len(found), "video")
-    return VotePage(shell, plural(choices, "comparison"), systems, videos, INDEX_FILE)
+    return VotePage(
+        shell,
+        plural(choices, "{n} comparison", "{n} comparisons"),
+        plural(len(voted_on(data)), "{n} system", "{n} systems"),
+        plural(len(found), "{n} video", "{n} videos"),
+        INDEX_FILE,
+    )
 
 
 def vote_files(data: SiteData) -> Iterator[tuple[str, bytes]]:

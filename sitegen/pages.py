@@ -13,10 +13,15 @@ from sitegen.exports import FORMATS
 from sitegen.failure_files import failure_files
 from sitegen.failures import Blame
 from sitegen.gathered import SiteData, System
+from sitegen.language import ENGLISH, ngettext, speaking
+from sitegen.language import gettext as _
 from sitegen.page_board import leaderboard_page, video_href, videos_page
 from sitegen.page_compare import ComparePage, compare_page
+from sitegen.page_data import DataPage, data_page
 from sitegen.page_failures import FailuresPage, failures_page
 from sitegen.page_method import method_page
+from sitegen.page_restoration import PATH as RESTORATION
+from sitegen.page_restoration import RestorationPage, restoration_files, restoration_page
 from sitegen.page_submission import submission_page
 from sitegen.page_submit import SubmitPage, submit_files, submit_page
 from sitegen.page_video import Place, video_page
@@ -37,6 +42,8 @@ Context: TypeAlias = (
     | ComparePage
     | SubmitPage
     | VotePage
+    | DataPage
+    | RestorationPage
     | MethodPage
 )
 
@@ -55,34 +62,46 @@ class Page:
 
 def make_pages(data: SiteData) -> Iterator[Page]:
     """Every page of the site, one after the other, so that few contexts are in memory at a time."""
-    names = f"{len(data.systems)} systems" if len(data.systems) != 1 else "one system"
-    about = f"{names} on {len(data.truth)} dashcam videos: BESM, SAM and detection rate."
+    names = ngettext("one system", "{n} systems", len(data.systems)).format(n=len(data.systems))
+    about = _("{systems} on {n} dashcam videos: BESM, SAM and detection rate.").format(
+        systems=names, n=len(data.truth)
+    )
     shell = _shell(data, data.settings.name, about, "", "leaderboard")
-    downloads = () if data.is_rehearsal else tuple(Link(name, path) for name, path, _ in FORMATS)
+    downloads = () if data.is_rehearsal else tuple(Link(name, path) for name, path, _made in FORMATS)
     ledger = LEDGER if data.ledger_file else ""
     context = leaderboard_page(data, shell, BOARD_FIGURES, downloads, ledger)
     yield Page("index.html", "leaderboard.html", context)
-    about = f"All {len(data.truth)} videos{'' if data.hidden else ' with their hazards'}."
-    shell = _shell(data, "Videos", about, "", "videos")
+    about = _("All {n} videos.") if data.hidden else _("All {n} videos with their hazards.")
+    shell = _shell(data, _("Videos"), about.format(n=len(data.truth)), "", "videos")
     yield Page("videos.html", "videos.html", videos_page(data, shell))
     yield from _video_pages(data)
     for system in data.systems:
-        about = f"{visible(system.name)}: scores, every video, provenance."
+        about = _("{system}: scores, every video, provenance.").format(system=visible(system.name))
         shell = _shell(data, visible(system.name), about, "../", "leaderboard")
         yield Page(f"submissions/{system.slug}.html", "submission.html", submission_page(data, system, shell))
     if not data.hidden:
-        about = "Every hazard that a system missed, where it was lost, and every wrong caption."
-        shell = _shell(data, "Failures", about, "", "failures")
+        about = _("Every hazard that a system missed, where it was lost, and every wrong caption.")
+        shell = _shell(data, _("Failures"), about, "", "failures")
         yield Page("failures.html", "failures.html", failures_page(data, _blames(data), shell))
-        about = "Two systems on the same videos: per-video differences, paired tests, who detects what."
-        shell = _shell(data, "Compare", about, "", "compare")
+        about = _("Two systems on the same videos: per-video differences, paired tests, who detects what.")
+        shell = _shell(data, _("Compare"), about, "", "compare")
         yield Page("compare.html", "compare.html", compare_page(data, shell))
-    about = "The format of a predictions file, a check of it in your browser, and the ways to send it."
-    yield Page("submit.html", "submit.html", submit_page(data, _shell(data, "Submit", about, "", "submit")))
-    about = "Which of two captions describes the hazard better? Two at a time, without names."
-    yield Page("vote.html", "vote.html", vote_page(data, _shell(data, "Vote", about, "", "vote")))
-    about = "What BESM, SAM, detection and hazard recall are, with an example; prompts, models, sources."
-    yield Page("method.html", "method.html", method_page(data, _shell(data, "Method", about, "", "method")))
+    about = _("The format of a predictions file, a check of it in your browser, and the ways to send it.")
+    shell = _shell(data, _("Submit"), about, "", "submit")
+    yield Page("submit.html", "submit.html", submit_page(data, shell))
+    about = _("Which of two captions describes the hazard better? Two at a time, without names.")
+    shell = _shell(data, _("Vote"), about, "", "vote")
+    yield Page("vote.html", "vote.html", vote_page(data, shell))
+    about = _("What the data hold: descriptions, labels, boxes, clips, and what a check of them found.")
+    shell = _shell(data, _("About the data"), about, "", "data")
+    yield Page("data.html", "data.html", data_page(data, shell))
+    if not data.restored.is_empty:
+        about = _("What was done to the clips, by which method, and a frame of each before and after.")
+        shell = _shell(data, _("Restored clips"), about, "", "videos")
+        yield Page(RESTORATION, "restoration.html", restoration_page(data, shell))
+    about = _("What BESM, SAM, detection and hazard recall are, with an example; prompts, models, sources.")
+    shell = _shell(data, _("Method"), about, "", "method")
+    yield Page("method.html", "method.html", method_page(data, shell))
 
 
 def _video_pages(data: SiteData) -> Iterator[Page]:
@@ -90,18 +109,20 @@ def _video_pages(data: SiteData) -> Iterator[Page]:
     links = [Link(visible(video_id), video_href(data, video_id)) for video_id in ids]
     for place, video_id in enumerate(ids):
         title = shown = visible(video_id)
-        about = f"{shown}. Keyframes and every system's captions."
+        about = _("{video}. Keyframes and every system's captions.").format(video=shown)
         if not data.hidden:
             labels = visible(title_of(data.truth[video_id]))
             title = f"{shorten(labels, 60)} · {shown}"
-            about = f"{shown}: {labels}. Keyframes, boxes, and every system's captions."
+            about = _("{video}: {labels}. Keyframes, boxes, and every system's captions.").format(
+                video=shown, labels=labels
+            )
         shell = _shell(data, title, shorten(about, 160), "../", "videos")
         boxes, media = data.boxes.get(video_id, ()), data.media[video_id]
         heard = [made for system in data.systems if (made := transcript(system, video_id, boxes, media))]
         where = Place(
             links[place - 1] if place else None,
             links[place + 1] if place + 1 < len(ids) else None,
-            f"{place + 1} of {len(ids)}",
+            _("{n} of {total}").format(n=place + 1, total=len(ids)),
         )
         context = video_page(data, video_id, shell, heard, where)
         yield Page(links[place].href, "video.html", context)
@@ -110,8 +131,9 @@ def _video_pages(data: SiteData) -> Iterator[Page]:
 def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
     """The files that pages load or offer: (path, content)."""
     if not data.is_rehearsal:  # a preview is no board to take away
-        for _, path, made in FORMATS:
-            yield path, made(data)
+        with speaking(ENGLISH):  # programs read these
+            files = [(path, made(data)) for _name, path, made in FORMATS]
+        yield from files
     if data.ledger_file:
         yield LEDGER, data.ledger_file
     yield from submit_files(data)
@@ -120,6 +142,7 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
         yield from compare_files(data)
         yield from failure_files(data, _blames(data))
     yield from board_files(data)
+    yield from restoration_files(data)
     if not data.systems:
         return
     figures = {"besm-sam": charts.besm_against_sam([_point(system) for system in data.systems])}
@@ -143,6 +166,6 @@ def _point(system: System) -> charts.Point:
 
 
 def _shell(data: SiteData, title: str, description: str, root: str, section: str) -> Shell:
-    return Shell(
-        visible(title), description, root, section, visible(data.settings.name), __version__, data.hidden
-    )
+    name, language, restored = visible(data.settings.name), data.settings.language, not data.restored.is_empty
+    hidden = data.hidden
+    return Shell(visible(title), description, root, section, name, __version__, hidden, language, restored)

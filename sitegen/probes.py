@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.records import TruthHazard
 from pipeline.scores import Submission
+from sitegen import probe_words
 from sitegen.copies import (
     Copy,
     NumberedCaptions,
@@ -19,7 +20,7 @@ from sitegen.copies import (
     whole_blocks,
 )
 from sitegen.evaluate import TextVectors
-from sitegen.numerals import percent, plural
+from sitegen.language import N_
 from sitegen.score import Index, Real, passes
 from sitegen.words import shorten, visible
 
@@ -185,90 +186,89 @@ def exchange(
 
 
 def _constant(captions: NumberedCaptions) -> Probe:
-    parts = "constant", "Constant caption", CONSTANT, f"from {percent(CONSTANT)} of the videos"
+    wanted = probe_words.from_share(CONSTANT, N_("from {share} of the videos"))
+    parts = "constant", N_("Constant caption"), CONSTANT, wanted
     videos = len(np.unique(captions.video))
     if videos < _LEAST:
-        return _unsaid(*parts, f"Captions in {plural(videos, 'video')} are too few to say.")
+        return _unsaid(*parts, probe_words.few_videos(videos))
     pairs = np.unique(np.stack([captions.video, captions.form]), axis=1)
     most = int(np.bincount(pairs[1]).max())
-    sentence = f"The most common caption is given in {most:,} of the {videos:,} videos that have captions."
+    sentence = probe_words.most_common(most, videos)
     return _share(*parts, most / videos, most / videos >= CONSTANT, sentence)
 
 
 def _word_bag(captions: NumberedCaptions, bags: Sequence[bool] | None) -> Probe:
-    parts = "word-bag", "Bag of common words", WORD_BAG, f"from {percent(WORD_BAG)} of the captions"
+    wanted = probe_words.from_share(WORD_BAG, N_("from {share} of the captions"))
+    parts = "word-bag", N_("Bag of common words"), WORD_BAG, wanted
     total = len(captions.form)
     if bags is None:
-        return _unsaid(*parts, "The truth itself is not in English sentences, so this cannot be said.")
+        unknown = N_("The truth itself is not in English sentences, so this cannot be said.")
+        return _unsaid(*parts, probe_words.said(unknown))
     if total < _LEAST:
-        return _unsaid(*parts, f"{plural(total, 'caption')} in all: too few to say.")
+        return _unsaid(*parts, probe_words.few_captions(total))
     count = sum(bags[form] for form in captions.form.tolist())
-    sentence = f"Common words strung together without a sentence: {count:,} of {total:,} captions."
-    return _share(*parts, count / total, count / total >= WORD_BAG, sentence)
+    return _share(*parts, count / total, count / total >= WORD_BAG, probe_words.bags(count, total))
 
 
 def _shuffled(found: Exchange) -> Probe:
-    parts = "shuffled", "Shuffled videos", SHUFFLED, f"from {percent(SHUFFLED)} of BESM"
+    wanted = probe_words.from_share(SHUFFLED, N_("from {share} of BESM"))
+    parts = "shuffled", N_("Shuffled videos"), SHUFFLED, wanted
     if found.said < _LEAST_SHUFFLED:
-        few = f"Captions in {plural(found.said, 'video')} with a hazard are too few to say."
-        return _unsaid(*parts, few)
+        return _unsaid(*parts, probe_words.few_with_hazard(found.said))
     if found.own_besm <= 0:
-        return _unsaid(*parts, "BESM is 0 over the videos with a hazard, so nothing can be lost.")
+        nothing = N_("BESM is 0 over the videos with a hazard, so nothing can be lost.")
+        return _unsaid(*parts, probe_words.said(nothing))
     kept = found.other_besm / found.own_besm
-    sentence = (
-        f"With the captions of other videos BESM is {found.other_besm:.4f} instead of {found.own_besm:.4f}, "
-        f"and {found.other_detected:.1f} instead of {found.own_detected:.0f} "
-        f"of the {found.videos:,} videos with a hazard are detected."
-    )
-    return _share(*parts, kept, kept >= SHUFFLED, sentence)
+    besm, detected = (found.other_besm, found.own_besm), (found.other_detected, found.own_detected)
+    return _share(*parts, kept, kept >= SHUFFLED, probe_words.exchanged(besm, detected, found.videos))
 
 
 def _stuffing(captions: NumberedCaptions) -> Probe:
-    parts = "stuffing", "Many captions a video", STUFFING, f"over {STUFFING:.0f} captions a video"
+    parts = "stuffing", N_("Many captions a video"), STUFFING, probe_words.over_captions(STUFFING)
     counts = np.unique(captions.video, return_counts=True)[1]
     if not len(counts):
-        return _unsaid(*parts, "There are no captions.")
+        return _unsaid(*parts, probe_words.said(N_("There are no captions.")))
     mean = float(counts.mean())
-    videos = plural(len(counts), "video")
-    sentence = f"Over {videos} with captions: {mean:.1f} captions on average, {counts.max():,} at most."
-    return Probe(*parts[:2], mean, f"{mean:.1f} captions a video", *parts[2:], mean > STUFFING, sentence)
+    sentence = probe_words.captions_on_average(len(counts), mean, int(counts.max()))
+    text = probe_words.captions_a_video(mean)
+    return Probe(*parts[:2], mean, text, *parts[2:], mean > STUFFING, sentence)
 
 
 def _near_copy(captions: NumberedCaptions, copy: Copy | None, names: Sequence[str]) -> Probe:
-    parts = "near-copy", "Near copy", NEAR_COPY, f"from {percent(NEAR_COPY)} of the videos"
+    wanted = probe_words.from_share(NEAR_COPY, N_("from {share} of the videos"))
+    parts = "near-copy", N_("Near copy"), NEAR_COPY, wanted
     videos = len(np.unique(captions.video))
     if videos < _LEAST:
-        return _unsaid(*parts, f"Captions in {plural(videos, 'video')} are too few to say.")
+        return _unsaid(*parts, probe_words.few_videos(videos))
     if copy is None:
-        return _unsaid(*parts, "There is no other submission.")
+        return _unsaid(*parts, probe_words.said(N_("There is no other submission.")))
     name = shorten(visible(names[copy.other]), _NAME_CHARS)
-    sentence = f"The same captions as “{name}” in {copy.same:,} of {plural(copy.either, 'video')}."
+    sentence = probe_words.same_captions(name, copy.same, copy.either)
     if not copy.same:
-        sentence = "In no video the same captions as another submission."
+        sentence = probe_words.said(N_("In no video the same captions as another submission."))
     return _share(*parts, copy.share, copy.share >= NEAR_COPY, sentence)
 
 
 def _truth_copy(captions: NumberedCaptions, hazard_video: Index, hazard_form: Index) -> Probe:
-    wanted = f"from {percent(TRUTH_COPY)}, at least {_LEAST_COPIES} hazards"
-    parts = "truth-copy", "The truth's own words", TRUTH_COPY, wanted
+    wanted = probe_words.from_share_of_hazards(TRUTH_COPY, _LEAST_COPIES)
+    parts = "truth-copy", N_("The truth's own words"), TRUTH_COPY, wanted
     total = len(hazard_form)
     if not len(captions.form):
-        return _unsaid(*parts, "There are no captions.")
+        return _unsaid(*parts, probe_words.said(N_("There are no captions.")))
     if not total:
-        return _unsaid(*parts, f"No hazard is described in {_COPIED_WORDS} words or more.")
+        return _unsaid(*parts, probe_words.no_long_truth(_COPIED_WORDS))
     said = set(zip(captions.video.tolist(), captions.form.tolist(), strict=True))
     pairs = zip(hazard_video.tolist(), hazard_form.tolist(), strict=True)
     count = sum(pair in said for pair in pairs)
-    sentence = f"Described in exactly the words of the truth: {count:,} of {plural(total, 'hazard')}."
     flagged = count >= _LEAST_COPIES and count / total >= TRUTH_COPY
-    return _share(*parts, count / total, flagged, sentence)
+    return _share(*parts, count / total, flagged, probe_words.exact_words(count, total))
 
 
 def _share(
     kind: str, name: str, threshold: float, wanted: str, value: float, flagged: bool, sentence: str
 ) -> Probe:
-    return Probe(kind, name, value, percent(value), threshold, wanted, flagged, sentence)
+    return Probe(kind, name, value, probe_words.share(value), threshold, wanted, flagged, sentence)
 
 
 def _unsaid(kind: str, name: str, threshold: float, wanted: str, sentence: str) -> Probe:
-    return Probe(kind, name, None, "cannot be said", threshold, wanted, False, sentence)
+    return Probe(kind, name, None, probe_words.said(N_("cannot be said")), threshold, wanted, False, sentence)

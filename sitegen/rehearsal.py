@@ -5,6 +5,8 @@ from dataclasses import asdict
 from typing import Any
 
 from pipeline.errors import Fault
+from sitegen.language import N_
+from sitegen.language import gettext as _
 from sitegen.standings import Standing
 from sitegen.uncertainty import Interval, uncertainties
 from sitegen.words import shorten, visible
@@ -12,8 +14,8 @@ from sitegen.words import shorten, visible
 METRICS = {
     "besm": "BESM",
     "sam": "SAM",
-    "detection_rate": "Detection rate",
-    "hazard_recall": "Hazard recall",
+    "detection_rate": N_("Detection rate"),
+    "hazard_recall": N_("Hazard recall"),
 }
 
 
@@ -52,11 +54,16 @@ def report(standings: Sequence[Standing], place: int) -> dict[str, Any]:
 
 def rank_words(told: Mapping[str, Any]) -> str:
     """Where a submission would stand, in a sentence."""
-    ties = told["band_with"]
-    shared = f", shared with {len(ties)} it cannot be told apart from" if ties else ""
+    text = _("Rank {rank} of {total}; in 95 % of resamples {ranks}.")
+    if told["band_with"]:
+        text = _(
+            "Rank {rank} of {total}, shared with {n} it cannot be told apart from; in 95 % of resamples "
+            "{ranks}."
+        )
     low, high = told["rank_low"], told["rank_high"]
-    span = f"rank {low}" if low == high else f"ranks {low} to {high}"
-    return f"Rank {told['band']} of {told['of']}{shared}; in 95 % of resamples {span}."
+    ranks = _("rank {low}") if low == high else _("ranks {low} to {high}")
+    n = len(told["band_with"])
+    return text.format(rank=told["band"], total=told["of"], n=n, ranks=ranks.format(low=low, high=high))
 
 
 def markdown(told: Mapping[str, Any]) -> str:

@@ -7,8 +7,17 @@ from typing import NamedTuple
 
 from pipeline.records import Exclusion, Kind, Prediction, Stage, StageOutput, TruthHazard
 from sitegen.gathered import Records
+from sitegen.language import N_, ngettext, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import plural
 from sitegen.words import shorten, visible
+
+EXCLUSIONS: dict[Exclusion, str] = {
+    Exclusion.TOO_NARROW: N_("too narrow"),
+    Exclusion.TOO_LOW: N_("too low"),
+    Exclusion.AREA_TOO_SMALL: N_("area too small"),
+    Exclusion.OUTSIDE_FRAME: N_("outside the frame"),
+}
 
 _QUOTE_CHARS = 80
 _LISTED = 3
@@ -33,10 +42,19 @@ _LISTS = {
 
 
 class Saying(NamedTuple):
-    """A text, and the words before "“...”" in a sentence that quotes it: "Frame 24 speaks of"."""
+    """A text, and a clause that quotes some of its words: "Frame 24 speaks of {words}"."""
 
     where: str
     text: str
+
+    def quoting(self, words: str) -> str:
+        """The clause with these words of the text in quotation marks."""
+        return self.where.replace("{words}", quoted(words))
+
+
+def exclusion(reason: Exclusion) -> str:
+    """Why a snippet was left out, in words."""
+    return _(EXCLUSIONS[reason])
 
 
 def quoted(text: str, limit: int = _QUOTE_CHARS) -> str:
@@ -46,7 +64,10 @@ def quoted(text: str, limit: int = _QUOTE_CHARS) -> str:
 
 def of_caption(prediction: Prediction) -> Saying:
     """A caption with its label."""
-    return Saying(f"Caption {prediction.rank} names", _both(prediction.label, prediction.description))
+    return Saying(
+        _("Caption {n} names {words}").format(n=prediction.rank, words="{words}"),
+        _both(prediction.label, prediction.description),
+    )
 
 
 def sayings(records: Records | None, step: Step) -> tuple[Saying, ...] | None:
@@ -67,7 +88,10 @@ def sayings(records: Records | None, step: Step) -> tuple[Saying, ...] | None:
         return None
     name = _LISTS[step].upper()
     return tuple(
-        Saying(f"The {name} names, at rank {item.rank},", _both(item.label, item.description))
+        Saying(
+            _("The {list} names, at rank {n}, {words}").format(list=name, n=item.rank, words="{words}"),
+            _both(item.label, item.description),
+        )
         for item in final.items
     )
 
@@ -81,19 +105,24 @@ def is_recorded(records: Records | None, step: Step) -> bool:
 def counted(records: Records) -> str:
     """How much was said before the first list: "25 scene descriptions and 20 video answers"."""
     stages = Counter(output.stage for output in records.stages)
-    names = {Stage.SCENE: "scene description", Stage.ANSWER: "video answer"}
-    return " and ".join(plural(stages[stage], name) for stage, name in names.items() if stages[stage])
+    scenes = plural(stages[Stage.SCENE], "{n} scene description", "{n} scene descriptions")
+    answers = plural(stages[Stage.ANSWER], "{n} video answer", "{n} video answers")
+    if stages[Stage.SCENE] and stages[Stage.ANSWER]:
+        return _("{scenes} and {answers}").format(scenes=scenes, answers=answers)
+    return scenes if stages[Stage.SCENE] else answers
 
 
 def instead(records: Records, step: Step) -> str:
     """What the list of a step holds, for a sentence on what it does not: "the RHS names only “car”"."""
     final = _final(records.stages, _LISTS[step])
-    name = f"the {_LISTS[step].upper()}"
+    name = _LISTS[step].upper()
     if final is None or not final.items:
-        return f"{name} is empty"
+        return _("the {list} is empty").format(list=name)
     names = [quoted(item.label or item.description, 40) for item in final.items]
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return f"{name} names only {', '.join(names[:_LISTED])}{more}"
+    named = ", ".join(names[:_LISTED])
+    if len(names) > _LISTED:
+        named = _("{names} and {n} more").format(names=named, n=len(names) - _LISTED)
+    return _("the {list} names only {names}").format(list=name, names=named)
 
 
 def too_small(records: Records | None, hazard: TruthHazard, others: Sequence[TruthHazard]) -> str:
@@ -119,9 +148,12 @@ def too_small(records: Records | None, hazard: TruthHazard, others: Sequence[Tru
         return ""
     tracks = sorted({snippet.track_box.track_id for snippet in mine})
     named = ", ".join(shorten(visible(track), 24) for track in tracks[:_LISTED])
-    why = ", ".join(f"{reasons[reason]:,} {reason}" for reason in Exclusion if reasons[reason])
-    which = "the only snippet" if len(mine) == 1 else f"all {len(mine):,} snippets"
-    return f"{which} of track {named} {'was' if len(mine) == 1 else 'were'} left out for the size: {why}"
+    why = ", ".join(f"{whole(reasons[one])} {exclusion(one)}" for one in Exclusion if reasons[one])
+    return ngettext(
+        "the only snippet of track {tracks} was left out for the size: {reasons}",
+        "all {n} snippets of track {tracks} were left out for the size: {reasons}",
+        len(mine),
+    ).format(n=whole(len(mine)), tracks=named, reasons=why)
 
 
 def _both(label: str | None, description: str) -> str:
@@ -130,8 +162,9 @@ def _both(label: str | None, description: str) -> str:
 
 def _place(output: StageOutput) -> str:
     if output.stage is Stage.ANSWER:
-        return f"Video answer {output.call + 1} speaks of"
-    return f"The description of frame {output.frame_index} speaks of"
+        return _("Video answer {n} speaks of {words}").format(n=output.call + 1, words="{words}")
+    text = _("The description of frame {n} speaks of {words}")
+    return text.format(n=output.frame_index, words="{words}")
 
 
 def _final(outputs: Sequence[StageOutput], stage: Stage) -> StageOutput | None:

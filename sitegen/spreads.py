@@ -8,13 +8,15 @@ from sitegen import charts
 from sitegen.contexts import Chart
 from sitegen.failure_files import SIZES, hazard_size
 from sitegen.gathered import SiteData, System
+from sitegen.language import N_, fixed
+from sitegen.language import gettext as _
 from sitegen.numerals import plural
 from sitegen.words import shorten, visible
 
 MAX_SYSTEMS = 6
 MAX_KINDS = 10
-OTHER = "other"
-NO_LABEL = "no label"
+OTHER = N_("other")
+NO_LABEL = N_("no label")
 
 Group = Callable[[TruthHazard], str]
 
@@ -24,13 +26,13 @@ def spreads(data: SiteData) -> Iterator[tuple[Chart, charts.Figure]]:
     hazards = [row for video_id in data.video_ids for row in data.truth[video_id] if not row.is_no_hazard]
     if not hazards or not data.systems:
         return
-    sizes = dict(SIZES)
+    sizes = {size: _(words) for size, words in SIZES.items()}
     yield _spread(
         data,
         hazards,
         "by-size",
-        "By the size of the hazard's box",
-        "The largest box of the hazard's track on a keyframe, as a share of the frame.",
+        _("By the size of the hazard's box"),
+        _("The largest box of the hazard's track on a keyframe, as a share of the frame."),
         lambda row: sizes[hazard_size(data, row)],
         list(sizes.values()),
     )
@@ -39,15 +41,15 @@ def spreads(data: SiteData) -> Iterator[tuple[Chart, charts.Figure]]:
         data,
         hazards,
         "by-kind",
-        "By the kind of hazard",
-        f"The truth's label; the {MAX_KINDS} most common, the rest together.",
-        lambda row: label if (label := _label(row)) in labels else OTHER,
-        [*labels, OTHER],
+        _("By the kind of hazard"),
+        _("The truth's label; the {n} most common, the rest together.").format(n=MAX_KINDS),
+        lambda row: label if (label := _label(row)) in labels else _(OTHER),
+        [*labels, _(OTHER)],
     )
 
 
 def _label(row: TruthHazard) -> str:
-    return shorten(visible(row.label), 28).casefold().strip() or NO_LABEL
+    return shorten(visible(row.label), 28).casefold().strip() or _(NO_LABEL)
 
 
 def _labels(hazards: list[TruthHazard]) -> list[str]:
@@ -87,14 +89,16 @@ def _spread(
         means.append([fsum(found) / len(found) for found in values])
     counted = ", ".join(f"{name} {len(members[name])}" for name in groups)
     first = max(zip(means[0], groups, strict=True))
-    left_out = f" The first {MAX_SYSTEMS} systems are shown." if len(data.systems) > MAX_SYSTEMS else ""
+    closest = _("{system} comes closest on “{group}”, with a mean best similarity of {mean}.")
     summary = (
-        f"{about} {plural(len(hazards), 'hazard')}: {counted}. {visible(shown[0].name)} comes closest on "
-        f"“{first[1]}”, with a mean best similarity of {first[0]:.2f}.{left_out}"
+        f"{about} {plural(len(hazards), '{n} hazard', '{n} hazards')}: {counted}. "
+        f"{closest.format(system=visible(shown[0].name), group=first[1], mean=fixed(first[0], 2))}"
     )
+    if len(data.systems) > MAX_SYSTEMS:
+        summary += " " + _("The first {n} systems are shown.").format(n=MAX_SYSTEMS)
     table = tuple(
-        (visible(system.name), *(f"{value:.4f}" for value in row))
+        (visible(system.name), *(fixed(value, 4) for value in row))
         for system, row in zip(shown, means, strict=True)
     )
     figure = charts.means_by_group([system.name for system in shown], groups, means, data.settings.threshold)
-    return Chart(chart_id, title, summary, ("Submission", *groups), table), figure
+    return Chart(chart_id, title, summary, (_("Submission"), *groups), table), figure

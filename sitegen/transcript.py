@@ -1,26 +1,40 @@
 """What every stage of a system said about a video, and how its verification went."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
-from pipeline.records import Exclusion, Kind, Match, Snippet, Stage, StageOutput, TrackBox
+from pipeline.records import Exclusion, Kind, Match, Parse, Snippet, Stage, StageOutput, TrackBox
 from sitegen.figure2 import figure2
 from sitegen.gathered import System, VideoMedia
+from sitegen.language import N_, whole
+from sitegen.language import gettext as _
 from sitegen.numerals import plural, score
+from sitegen.sayings import exclusion
 from sitegen.thumbnails import snippet_pictures
 from sitegen.video_contexts import Saying, StageView, TrackCheck, Transcript
 from sitegen.words import shorten, visible
 
 STAGES: dict[Stage, tuple[str, str]] = {
-    Stage.SCENE: ("Scene descriptions", "Track 1: what the vision agent saw in each keyframe"),
-    Stage.RHS: ("Ranked Hazards Set", "Track 1: hazards in those descriptions, most hazardous first"),
-    Stage.ANSWER: ("Video answers", "Track 2: the objects on the road, asked again and again"),
-    Stage.CHUNKS: ("Noun chunks", "Track 2: the nouns in each answer"),
-    Stage.AES: ("All Elements Set", "Track 2: the best list of elements"),
-    Stage.COS: ("Critical Object Set", "Cross-reference: ranked hazards that both tracks know"),
-    Stage.AOS: ("Anomalous Object Set", "Anomaly: the hazards that are the final captions"),
+    Stage.SCENE: (N_("Scene descriptions"), N_("Track 1: what the vision agent saw in each keyframe")),
+    Stage.RHS: (N_("Ranked Hazards Set"), N_("Track 1: hazards in those descriptions, most hazardous first")),
+    Stage.ANSWER: (N_("Video answers"), N_("Track 2: the objects on the road, asked again and again")),
+    Stage.CHUNKS: (N_("Noun chunks"), N_("Track 2: the nouns in each answer")),
+    Stage.AES: (N_("All Elements Set"), N_("Track 2: the best list of elements")),
+    Stage.COS: (N_("Critical Object Set"), N_("Cross-reference: ranked hazards that both tracks know")),
+    Stage.AOS: (N_("Anomalous Object Set"), N_("Anomaly: the hazards that are the final captions")),
 }
+PARSES: dict[Parse, str] = {
+    Parse.JSON: N_("json"),
+    Parse.LITERAL: N_("literal"),
+    Parse.LINES: N_("lines"),
+    Parse.COMMAS: N_("commas"),
+    Parse.PROSE: N_("prose"),
+    Parse.EMPTY: N_("empty"),
+    Parse.FAILED: N_("failed"),
+}
+"""How an answer was turned into items, in a word."""
+
 _MAX_REPLY = 4_000
 _MAX_LABELS = 6
 
@@ -43,9 +57,12 @@ def transcript(
     )
     tracks = _tracks(records.snippets, records.matches, hazards)
     counted = sum(snippet.excluded is None for snippet in records.snippets)
-    summary = f"{plural(len(records.stages), 'call')} in {plural(len(stages), 'stage')}"
+    summary = _("{calls} in {stages}").format(
+        calls=_calls(len(records.stages)), stages=plural(len(stages), "{n} stage", "{n} stages")
+    )
     if records.snippets:
-        summary += f", {counted:,} of {plural(len(records.snippets), 'snippet')} verified"
+        verified = _("{n} of {snippets} verified")
+        summary += ", " + verified.format(n=whole(counted), snippets=_snippets(len(records.snippets)))
     return Transcript(
         system.slug,
         visible(system.name),
@@ -64,11 +81,11 @@ def _stage(stage: Stage, outputs: Sequence[StageOutput]) -> StageView:
     prompts = dict.fromkeys(output.prompt_id for output in outputs if output.prompt_id)
     return StageView(
         str(stage),
-        name,
-        meaning,
+        _(name),
+        _(meaning),
         visible(", ".join(models)),
         visible(", ".join(prompts)),
-        plural(len(outputs), "call"),
+        _calls(len(outputs)),
         tuple(
             _saying(list(run)) for _, run in groupby(outputs, lambda o: (o.reply.text, o.items, str(o.parse)))
         ),
@@ -78,13 +95,13 @@ def _stage(stage: Stage, outputs: Sequence[StageOutput]) -> StageView:
 def _saying(run: Sequence[StageOutput]) -> Saying:
     first, last = run[0], run[-1]
     if first.frame_index is not None:
-        where = f"frame {first.frame_index}"
+        where = _("frame {n}").format(n=first.frame_index)
         if last.frame_index != first.frame_index:
-            where = f"frames {first.frame_index}–{last.frame_index}"
+            where = _("frames {first}–{last}").format(first=first.frame_index, last=last.frame_index)
     else:
-        where = f"call {first.call + 1}"
+        where = _("call {n}").format(n=first.call + 1)
         if last.call != first.call:
-            where = f"calls {first.call + 1}–{last.call + 1}"
+            where = _("calls {first}–{last}").format(first=first.call + 1, last=last.call + 1)
     items = tuple(
         (visible(item.label), "" if item.description == item.label else visible(item.description))
         for item in first.items
@@ -93,7 +110,7 @@ def _saying(run: Sequence[StageOutput]) -> Saying:
     spoken = {first.reply.text.strip(), first.reply.text.strip().rstrip(".")}
     if len(items) == 1 and {first.items[0].label, first.items[0].description} & spoken:
         items = ()
-    return Saying(where, f"×{len(run)}" if len(run) > 1 else "", items, reply, str(first.parse))
+    return Saying(where, f"×{len(run)}" if len(run) > 1 else "", items, reply, _(PARSES[first.parse]))
 
 
 def _tracks(
@@ -118,8 +135,8 @@ def _track(track: str, snippets: Sequence[Snippet], matches: Sequence[Match], ha
     return TrackCheck(
         shorten(visible(track), 24),
         hazard,
-        f"{counted} of {len(snippets)}",
-        ", ".join(f"{reasons[reason]} {reason}" for reason in Exclusion if reason in reasons),
+        _("{n} of {total}").format(n=counted, total=len(snippets)),
+        _reasons(reasons),
         shorten(visible(best.label), 60) if best else "",
         score(best.cosine, digits=3) if best else None,
         ", ".join(f"{shorten(visible(n), 40)} ×{c}" for n, c in detected.most_common(_MAX_LABELS)),
@@ -131,6 +148,21 @@ def _tracks_summary(snippets: Sequence[Snippet]) -> str:
     if not snippets:
         return ""
     reasons = Counter(snippet.excluded for snippet in snippets if snippet.excluded is not None)
-    text = f"{plural(len(snippets), 'snippet')} considered, {len(snippets) - reasons.total():,} compared"
-    parts = [f"{reasons[reason]:,} {reason}" for reason in Exclusion if reason in reasons]
-    return f"{text}; left out: {', '.join(parts)}." if parts else f"{text}; none left out."
+    text = _("{snippets} considered, {n} compared; none left out.")
+    if reasons:
+        text = _("{snippets} considered, {n} compared; left out: {reasons}.")
+    compared = whole(len(snippets) - reasons.total())
+    return text.format(snippets=_snippets(len(snippets)), n=compared, reasons=_reasons(reasons))
+
+
+def _reasons(reasons: Mapping[Exclusion, int]) -> str:
+    """How many snippets were left out for each reason."""
+    return ", ".join(f"{whole(reasons[one])} {exclusion(one)}" for one in Exclusion if reasons.get(one))
+
+
+def _calls(count: int) -> str:
+    return plural(count, "{n} call", "{n} calls")
+
+
+def _snippets(count: int) -> str:
+    return plural(count, "{n} snippet", "{n} snippets")

@@ -7,30 +7,31 @@ from pipeline.records import TruthHazard
 from pipeline.scores import PairScore, VideoScore
 from sitegen.contexts import LedgerLine, Measure
 from sitegen.gathered import SiteData, System
+from sitegen.language import N_, fixed, whole
+from sitegen.language import gettext as _
 from sitegen.ledger import Entry
 from sitegen.numerals import Score, percent, rate, score
 from sitegen.score import TOLERANCE
 from sitegen.uncertainty import Interval
 from sitegen.words import shorten, visible
 
-NO_HAZARD = "No hazard"
-
 
 def title_of(truth: Sequence[TruthHazard]) -> str:
     """The labels of a video's hazards, or that there is none."""
     labels = [hazard.label or shorten(hazard.description, 40) for hazard in truth if not hazard.is_no_hazard]
-    return ", ".join(labels) or NO_HAZARD
+    return ", ".join(labels) or _("No hazard")
 
 
 def verdict(video: VideoScore) -> tuple[str, str]:
     """How a system did on a video: `pass`, `fail` or `silent`, and the same in words."""
     if video.n_hazards == 0:
-        return ("pass", "Rightly silent") if video.n_predictions == 0 else ("fail", "False alarm")
+        return ("pass", _("Rightly silent")) if video.n_predictions == 0 else ("fail", _("False alarm"))
     if video.detected:
         if video.n_hazards_found < video.n_hazards:
-            return "pass", f"Detected {video.n_hazards_found} of {video.n_hazards}"
-        return "pass", "Detected"
-    return ("silent", "Said nothing") if video.n_predictions == 0 else ("fail", "Not detected")
+            found, there = whole(video.n_hazards_found), whole(video.n_hazards)
+            return "pass", _("Detected {n} of {total}").format(n=found, total=there)
+        return "pass", _("Detected")
+    return ("silent", _("Said nothing")) if video.n_predictions == 0 else ("fail", _("Not detected"))
 
 
 def best_pairs(system: System, video_id: str) -> dict[int, PairScore]:
@@ -50,7 +51,7 @@ def cosine_score(pair: PairScore, threshold: float) -> Score:
 
 def measure(value: float, interval: Interval) -> Measure:
     """A mean of similarities in [0, 1] with its interval, to two digits."""
-    return _measure(score(value), interval, f"{interval.low:.2f}–{interval.high:.2f}")
+    return _measure(score(value), interval, f"{fixed(interval.low, 2)}–{fixed(interval.high, 2)}")
 
 
 def rate_measure(value: float, interval: Interval) -> Measure:
@@ -79,22 +80,27 @@ def first_share(system: System) -> Score:
 def ranks_text(system: System) -> str:
     """The ranks that a system takes in 95 % of the resamples."""
     low, high = system.uncertainty.rank_low, system.uncertainty.rank_high
-    return f"{low} to {high}" if low < high else f"{low}"
+    return _("{low} to {high}").format(low=low, high=high) if low < high else f"{low}"
 
 
-_EVENTS = {"add": "added", "replace": "replaced", "rescore": "rescored", "withdraw": "withdrawn"}
+_EVENTS = {
+    "add": N_("added"),
+    "replace": N_("replaced"),
+    "rescore": N_("rescored"),
+    "withdraw": N_("withdrawn"),
+}
 
 
 def ledger_line(data: SiteData, entry: Entry) -> LedgerLine:
     """A line of the ledger with the scores that it notes."""
     scores = (("BESM", entry.besm), ("SAM", entry.sam))
-    parts = [f"{name} {value:.4f}" for name, value in scores if value is not None]
-    shares = (("detection", entry.detection_rate), ("hazard recall", entry.hazard_recall))
+    parts = [f"{name} {fixed(value, 4)}" for name, value in scores if value is not None]
+    shares = ((_("detection"), entry.detection_rate), (_("hazard recall"), entry.hazard_recall))
     parts += [f"{name} {percent(value)}" for name, value in shares if value is not None]
     on_board = any(system.slug == entry.slug for system in data.systems)
     return LedgerLine(
         date=visible(entry.date),
-        event=_EVENTS[entry.event],
+        event=_(_EVENTS[entry.event]),
         name=visible(entry.name),
         slug=entry.slug if on_board else "",
         reason=visible(entry.reason),

@@ -221,6 +221,7 @@ class VideoPage:
     frames: tuple[FilmFrame, ...]
     cover: FilmFrame | None
     clip: str
+    restored: str
     tracks: tuple[TrackChip, ...]
     tracks_text: str
     crops: tuple[CropView, ...]

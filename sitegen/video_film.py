@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from pipeline.records import Kind, TrackBox, TruthHazard
 from sitegen.gathered import KeyframePicture, VideoMedia
+from sitegen.language import gettext as _
 from sitegen.numerals import number, plural, seconds
 from sitegen.video_contexts import FilmFrame, OverlayBox, TrackChip
 from sitegen.words import shorten, visible
@@ -37,16 +38,16 @@ def _film_frame(
     # Hazards last, so that they are drawn on top.
     ordered = sorted(boxes, key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id))
     seen = dict.fromkeys(box.track_id for box in ordered if box.kind is Kind.CHALLENGE)
-    parts = [f"hazard track {named_track(track, labels)}" for track in seen]
+    parts = [_("hazard track {track}").format(track=named_track(track, labels)) for track in seen]
     others = sum(box.kind is not Kind.CHALLENGE for box in ordered)
-    parts += [plural(others, "traffic box", "traffic boxes")] if others else []
+    parts += [plural(others, "{n} traffic box", "{n} traffic boxes")] if others else []
     return FilmFrame(
         place + 1,
         picture.index,
         seconds(picture.time_s),
         picture.thumb,
         picture.full,
-        f"{_when(picture.index, seconds(picture.time_s))}: {', '.join(parts) or 'no boxes'}",
+        f"{_when(picture.index, seconds(picture.time_s))}: {', '.join(parts) or _('no boxes')}",
         tuple(_overlay(box, media) for box in ordered),
         place == media.cover,
     )
@@ -85,11 +86,11 @@ def _by_size(track: str) -> tuple[int, str]:
 def tracks_text(tracks: Sequence[TrackChip]) -> str:
     """How many tracks there are, by kind."""
     hazards = sum(track.hazard for track in tracks)
-    return f"{hazards} hazard, {len(tracks) - hazards} traffic"
+    return _("{hazards} hazard, {others} traffic").format(hazards=hazards, others=len(tracks) - hazards)
 
 
 def _when(index: int, time: str) -> str:
-    return f"Frame {index} at {time}"
+    return _("Frame {n} at {time}").format(n=index, time=time)
 
 
 def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:

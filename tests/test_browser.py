@@ -26,6 +26,7 @@ PATHS = (
     "compare.html",
     "failures.html",
     "vote.html",
+    "data.html",
 )
 
 

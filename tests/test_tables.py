@@ -26,6 +26,7 @@ from pipeline.records import (
     TrackBox,
     TruthHazard,
     UsageRow,
+    VideoFile,
     VideoOutcome,
 )
 from pipeline.scores import PairScore, VideoScore
@@ -65,6 +66,10 @@ RECORDS: dict[str, list[Any]] = {
     "outcomes": [
         VideoOutcome("v2", "v2.mp4", 0, 0.0, 0, 0, "broken"),
         VideoOutcome("v1", "v1.mp4", 300, 29.97, 1280, 720, "", "odd"),
+    ],
+    "video_files": [
+        VideoFile("v2", "v2.mkv", 12, 0.0, 640, 360, "ff"),
+        VideoFile("v1", "v1.mp4", 300, 29.97, 1280, 720, "ee"),
     ],
     "usage": [
         UsageRow("v1", "scene", "gpt", 25, 1_000, 20, 12.5, 0.001),

@@ -2,6 +2,7 @@
 (function () {
   "use strict";
   var figures = window.COOOLER_FIGURES || {};
+  var i18n = window.COOOLER_I18N;
   var style;
 
   function coloured(value) {
@@ -40,6 +41,7 @@
       yaxis: axis(figure.layout.yaxis),
       margin: { l: 48, r: 16, t: 12, b: 44 },
       height: 320,
+      separators: i18n.fixed(0.5, 1)[1] + i18n.whole(1000)[1],
       paper_bgcolor: "rgba(0,0,0,0)",
       plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: "--ink" },

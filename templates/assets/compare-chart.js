@@ -34,7 +34,7 @@
     const text = (x, at, words, more) => texts.push({ x, y: at, words, fill: "--muted", ...more });
     for (let number = -below; number <= above; number += 1) {
       line(number * tick, { stroke: "--line" });
-      const words = difference(key, number * tick).replace(/(\.\d\d)0+$/, "$1");
+      const words = difference(key, number * tick).replace(/(\D\d\d)0+$/, "$1");
       text(SIDES.left - 8, y(number * tick) + 4, words, { anchor: "end" });
     }
     const bars = (keep) => values.map((value, place) => {

@@ -179,7 +179,7 @@
       rows.forEach((column, number) => {
         const cell = row.cells[number + 3];
         const [a, b] = [row.dataset.slug, column.dataset.slug];
-        const videos = Number(cell.textContent);
+        const videos = Number(cell.textContent.replace(/\D/g, ""));
         if (a === b || !videos) return;
         cell.textContent = "";
         const made = add(cell, "a", whole(videos));

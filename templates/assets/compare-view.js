@@ -1,7 +1,7 @@
 // What is said of two systems as wholes: in words, as a table of tests, as a chart.
 (function () {
   "use strict";
-  const { TEXT, add, whole, value, difference, isRate, p, size } = window.COOOLER_WORDS;
+  const { TEXT, add, whole, points, value, difference, p, size } = window.COOOLER_WORDS;
   const data = window.COOOLER_COMPARE;
   const chart = window.COOOLER_CHART;
   const page = (id) => document.getElementById(id);
@@ -31,6 +31,14 @@
     add(parent, "span", letter.toUpperCase(), `duel-mark duel-${letter}`);
   }
 
+  // A sentence with the names of two at {one} and {other}.
+  function tell(parent, sentence, letters) {
+    sentence.split(/\{(one|other)\}/).forEach((part, number) => {
+      if (number % 2) named(parent, letters[part]);
+      else parent.append(part);
+    });
+  }
+
   function showWords() {
     const words = page("duel-words");
     const { metric } = found;
@@ -38,24 +46,19 @@
     const number = index.metrics.indexOf(TESTED_BY[metric]);
     const [a, b] = number < 0 ? found.means : [found.a.cards[number], found.b.cards[number]];
     words.textContent = "";
-    if (Math.abs(a - b) < 1e-9) {
-      named(words, "a");
-      words.append(TEXT.and);
-      named(words, "b");
-      words.append(TEXT.level(TEXT.metric[metric], value(metric, a)));
-    } else {
-      named(words, a > b ? "a" : "b");
-      words.append(TEXT.isAhead);
-      named(words, a > b ? "b" : "a");
-      words.append(TEXT.ahead(TEXT.metric[metric], size(metric, a - b)));
-      words.append(TEXT.against(value(metric, Math.max(a, b)), value(metric, Math.min(a, b))));
+    const name = TEXT.metric[metric];
+    if (Math.abs(a - b) < 1e-9) tell(words, TEXT.level(name, value(metric, a)), { one: "a", other: "b" });
+    else {
+      const [high, low] = [Math.max(a, b), Math.min(a, b)].map((number) => value(metric, number));
+      const letters = a > b ? { one: "a", other: "b" } : { one: "b", other: "a" };
+      tell(words, TEXT.ahead(name, size(metric, a - b), high, low), letters);
     }
     const tested = test();
     if (tested) {
-      words.append(TEXT.chance(tested.p_randomisation));
+      words.append(` ${TEXT.chance(tested.p_randomisation)} `);
       add(words, "b", tested.p_randomisation < index.significant ? TEXT.apart : TEXT.notApart);
-    } else words.append(number < 0 ? TEXT.noTest : TEXT.untested(index.tested));
-    words.append(TEXT.tally(...["a-better", "b-better", "equal"].map(found.count)));
+    } else words.append(` ${number < 0 ? TEXT.noTest : TEXT.untested(index.tested)}`);
+    words.append(` ${TEXT.tally(...["a-better", "b-better", "equal"].map(found.count))}`);
   }
 
   function showTests() {
@@ -66,8 +69,7 @@
       if (a === null) return; // without a hazard there is no recall
       const row = add(body, "tr", "", TESTED_BY[found.metric] === key ? "duel-chosen" : "");
       add(row, "th", TEXT.metric[key]).scope = "row";
-      const points = isRate(key) ? ` ${TEXT.points}` : "";
-      const cells = [value(key, a), value(key, b), difference(key, a - b) + points];
+      const cells = [value(key, a), value(key, b), points(key, difference(key, a - b))];
       const tested = found.tests && found.tests[key];
       if (tested) {
         const { interval, p_randomisation: chance, wins, losses, ties } = tested;
@@ -82,13 +84,12 @@
     const { a, b, metric, places, differences, means } = found;
     const { scale } = data.index();
     const tested = test();
-    const name = TEXT.metric[metric];
     const about = {
       values: places.map((video) => differences[video] / scale),
       a: a.name,
       b: b.name,
       key: metric,
-      metric: name[0].toUpperCase() + name.slice(1),
+      metric: TEXT.title[metric],
       mean: means[0] - means[1],
       interval: tested && tested.interval,
     };
@@ -106,17 +107,18 @@
   async function summarise(values, tested) {
     const now = found;
     const counts = ["a-better", "b-better", "equal"].map(found.count);
-    let words = TEXT.summary(...counts);
+    const words = [TEXT.summary(...counts)];
     if (found.metric !== "detection") {
       const ends = [0, values.length - 1];
       const videos = await Promise.all(ends.map((end) => data.video(found.places[end]))).catch(() => []);
       if (now !== found) return;
       ends.forEach((end, number) => {
         if (!counts[number] || !videos.length) return;
-        words += TEXT.extreme("AB"[number], difference(found.metric, values[end]), videos[number].shown);
+        words.push(TEXT.extreme("AB"[number], difference(found.metric, values[end]), videos[number].shown));
       });
     }
-    page("duel-summary").textContent = words + (tested ? TEXT.band : "") + TEXT.below;
+    if (tested) words.push(TEXT.band);
+    page("duel-summary").textContent = [...words, TEXT.below].join(" ");
   }
 
   // Marks a video in the chart.

@@ -22,8 +22,8 @@
         facet.find = add(facet.group, "input", "", "fail-find");
         facet.find.type = "search";
         facet.find.autocomplete = "off";
-        facet.find.placeholder = TEXT.find(TEXT.facets[facet.name]);
-        facet.find.setAttribute("aria-label", TEXT.find(TEXT.facets[facet.name]));
+        facet.find.placeholder = TEXT.find[facet.name];
+        facet.find.setAttribute("aria-label", TEXT.find[facet.name]);
         facet.find.addEventListener("input", () => {
           facet.shown = FIRST;
           arrange(facet);
@@ -115,8 +115,8 @@
       const item = document.createElement("li");
       const button = add(item, "button", "", "quiet fail-chip");
       button.type = "button";
-      const words = `${TEXT.facets[facet.name]}: ${facet.values[value][1]}`;
-      button.setAttribute("aria-label", `${words}, ${TEXT.remove}`);
+      const words = TEXT.chosen(TEXT.facets[facet.name], facet.values[value][1]);
+      button.setAttribute("aria-label", TEXT.remove(words));
       add(button, "span", words);
       add(button, "span", "×");
       button.addEventListener("click", () => {

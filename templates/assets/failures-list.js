@@ -1,7 +1,7 @@
 // The list: only what is near the window is in the document. Every item has the same height.
 (function () {
   "use strict";
-  const { TEXT, add } = window.COOOLER_FAILURE_WORDS;
+  const { TEXT, fixed, add } = window.COOOLER_FAILURE_WORDS;
   const data = window.COOOLER_FAILURE_DATA;
   const SVG = "http://www.w3.org/2000/svg";
   const AHEAD = 6; // items beyond the window, on both sides
@@ -116,7 +116,7 @@
 
   function part(words, name, kind, text) {
     const line = add(words, "p", "", kind);
-    add(line, "span", `${name}: `, "fail-part");
+    add(line, "span", `${name} `, "fail-part");
     if (text) line.append(text);
     return line;
   }
@@ -152,7 +152,7 @@
   function score(item, units) {
     const scale = data.index().units;
     const line = add(item, "p", "", "fail-score");
-    add(line, "b", (units / scale).toFixed(4), "num");
+    add(line, "b", fixed(units / scale, 4), "num");
     add(line, "span", TEXT.similarity, "sub");
     const bar = line.appendChild(document.createElementNS(SVG, "svg"));
     const set = (shape, values) => Object.entries(values).forEach(([name, text]) => {

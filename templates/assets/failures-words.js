@@ -1,45 +1,61 @@
-// Every word that the failures page's scripts write, and numbers as words.
+// Every word that the failures page's scripts write.
 (function () {
   "use strict";
-  const whole = (n) => n.toLocaleString("en");
-  const plural = (n, word) => `${whole(n)} ${word}${n === 1 ? "" : "s"}`;
-  const percent = (done, all) => `${all ? Math.floor((done / all) * 100) : 100}\u202f%`;
+  const { _, plural, whole, fixed } = window.COOOLER_I18N;
+  const percent = (done, all) => `${whole(all ? Math.floor((done / all) * 100) : 100)}\u202f%`;
+  const failures = (n) => plural(n, "{n} failure", "{n} failures");
 
   const TEXT = {
     facets: {
-      kind: "Kind",
-      system: "System",
-      score: "Similarity",
-      label: "Truth label",
-      size: "Hazard’s size",
-      stages: "Stages",
-      video: "Video",
+      kind: _("Kind"),
+      system: _("System"),
+      score: _("Similarity"),
+      label: _("Truth label"),
+      size: _("Hazard’s size"),
+      stages: _("Stages"),
+      video: _("Video"),
     },
-    search: "Search",
-    found: (shown, all) => `${shown === all ? "" : `${whole(shown)} of `}${plural(all, "failure")}`,
-    capped: (most) => `The first ${whole(most)} can be scrolled to; filter to see the others.`,
-    loading: (done, all) => `Loading failures: ${percent(done, all)}. Numbers grow until all are here.`,
-    reading: (done, all) => `Searching captions: ${percent(done, all)} read.`,
-    unloaded: "Some data could not be loaded, so that numbers are too low. Load the page again.",
-    unreadable: "could not be loaded",
-    unknown: (what) => `The address asks for what is not here: ${what}.`,
-    copied: "Link copied.",
-    notCopied: (link) => `The browser does not let this page copy. The link: ${link}`,
-    more: (n) => `Show ${whole(n)} more`,
-    find: (facet) => `Find: ${facet.toLowerCase()}`,
-    findNone: "Nothing of this name.",
-    remove: "remove",
-    filters: (n) => (n ? `Filters (${n} chosen)` : "Filters"),
-    said: "Caption",
-    silent: "Said nothing",
-    truth: "Truth",
-    evidence: "Evidence",
-    noHazard: "No hazard",
-    similarity: "best similarity",
-    noPicture: "No picture",
-    picture: (video, labels) => `A keyframe of ${video}: ${labels}`,
+    find: {
+      kind: _("Find: kind"),
+      system: _("Find: system"),
+      score: _("Find: similarity"),
+      label: _("Find: truth label"),
+      size: _("Find: hazard’s size"),
+      stages: _("Find: stages"),
+      video: _("Find: video"),
+    },
+    found: (shown, all) => (shown === all ? failures(all)
+      : plural(all, "{shown} of {n} failure", "{shown} of {n} failures", { shown: whole(shown) })),
+    capped: (most) =>
+      _("The first {n} can be scrolled to; filter to see the others.", { n: whole(most) }),
+    loading: (done, all) =>
+      _("Loading failures: {part}. Numbers grow until all are here.", { part: percent(done, all) }),
+    reading: (done, all) => _("Searching captions: {part} read.", { part: percent(done, all) }),
+    unloaded: _("Some data could not be loaded, so that numbers are too low. Load the page again."),
+    unreadable: _("could not be loaded"),
+    unknown: (what) => _("The address asks for what is not here: {what}.", { what }),
+    copied: _("Link copied."),
+    notCopied: (link) => _("The browser does not let this page copy. The link: {link}", { link }),
+    more: (n) => plural(n, "Show {n} more", "Show {n} more"),
+    findNone: _("Nothing of this name."),
+    chosen: (facet, value) => _("{facet}: {value}", { facet, value }),
+    remove: (words) => _("{words}, remove", { words }),
+    filters: (n) => (n ? plural(n, "Filters ({n} chosen)", "Filters ({n} chosen)") : _("Filters")),
+    said: _("Caption:"),
+    silent: _("Said nothing"),
+    truth: _("Truth:"),
+    evidence: _("Evidence:"),
+    noHazard: _("No hazard"),
+    similarity: _("best similarity"),
+    noPicture: _("No picture"),
+    picture: (video, labels) => _("A keyframe of {video}: {labels}", { video, labels }),
     wait: "…",
-    printed: (shown, all) => `Printed: the first ${whole(shown)} of ${plural(all, "failure")}.`,
+    printed: (shown, all) => plural(
+      all,
+      "Printed: the first {shown} of {n} failure.",
+      "Printed: the first {shown} of {n} failures.",
+      { shown: whole(shown) },
+    ),
   };
 
   function add(parent, tag, text, kind) {
@@ -49,5 +65,5 @@
     return parent.appendChild(made);
   }
 
-  window.COOOLER_FAILURE_WORDS = { TEXT, whole, add };
+  window.COOOLER_FAILURE_WORDS = { TEXT, whole, fixed, add };
 })();

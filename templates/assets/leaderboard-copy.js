@@ -55,7 +55,7 @@
   async function copy(what, text, say) {
     try {
       await navigator.clipboard.writeText(text);
-      say(TEXT.copied(TEXT.names[what]));
+      say(TEXT.copied[what]);
     } catch (error) {
       const dialog = document.getElementById("board-dialog");
       const field = dialog.querySelector("textarea");

@@ -44,7 +44,7 @@
   const fact = (term, ...value) => made("div", "", made("dt", "", term), made("dd", "", ...value));
 
   function video(term, [href, name, value]) {
-    return fact(term, link(href, name), made("span", "sub", words.besm(value)));
+    return fact(term, link(href, name), made("span", "sub", ` ${words.besm(value)}`));
   }
 
   // What the page came with; of what depends on the threshold it says which.
@@ -58,7 +58,7 @@
     const figures = row.measures
       .filter((measure) => measure.interval)
       .map((measure) => {
-        const interval = made("span", "sub", ` ${words.interval} ${measure.interval}`);
+        const interval = made("span", "sub", ` ${words.interval(measure.interval)}`);
         return fact(termOf(measure), measure.value, interval);
       });
     const facts = made("dl", "board-facts", ...figures);

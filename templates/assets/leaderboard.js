@@ -1,7 +1,8 @@
 // The leaderboard: rank by another score, another threshold, columns, details. All state is in the address.
 (function () {
   "use strict";
-  const { TEXT, percent } = window.COOOLER_WORDS;
+  const { TEXT } = window.COOOLER_WORDS;
+  const { marked, percent } = window.COOOLER_I18N;
   const details = window.COOOLER_DETAILS;
   const clip = window.COOOLER_COPY;
   const page = (id) => document.getElementById(id);
@@ -14,6 +15,7 @@
   const search = page("search");
   const slider = page("board-threshold");
   const thresholds = slider ? slider.dataset.texts.split(" ") : [];
+  const shownThreshold = (number) => marked(thresholds[number]);
   const published = slider ? Number(slider.defaultValue) : 0;
   const titles = heads.map((head) => head.textContent.trim());
   const at = (column) => columns.indexOf(column);
@@ -120,9 +122,9 @@
     MEASURES.forEach((column) => {
       rows.forEach((row) => row.cells[column].cell.classList.toggle("lead", column === state.rank));
     });
-    const words = state.rank === "besm" ? "" : TEXT.ranked(state.rank);
-    page("board-note").textContent = own ? words
-      : words + TEXT.elsewhere(thresholds[state.threshold], thresholds[published]);
+    const words = state.rank === "besm" ? [] : [TEXT.ranked(state.rank)];
+    if (!own) words.push(TEXT.elsewhere(shownThreshold(state.threshold), shownThreshold(published)));
+    page("board-note").textContent = words.join(" ");
     controls();
     remember();
   }
@@ -142,8 +144,8 @@
     });
     if (!slider) return;
     slider.value = state.threshold;
-    slider.setAttribute("aria-valuetext", thresholds[state.threshold]);
-    page("board-threshold-text").textContent = thresholds[state.threshold];
+    slider.setAttribute("aria-valuetext", shownThreshold(state.threshold));
+    page("board-threshold-text").textContent = shownThreshold(state.threshold);
     page("board-reset").hidden = state.threshold === published;
   }
 
@@ -234,7 +236,7 @@
       return interval && (own || !counted) ? `${row.texts[column]} (${interval})` : row.texts[column];
     };
     const notes = [TEXT.notes.interval];
-    if (slider) notes.push(TEXT.above(thresholds[state.threshold]));
+    if (slider) notes.push(TEXT.above(shownThreshold(state.threshold)));
     if (page("board-note").textContent) notes.push(page("board-note").textContent);
     if (signature) notes.push(TEXT.notes.signature(signature));
     return {

@@ -3,7 +3,10 @@
   "use strict";
   var root = document.documentElement;
   var THEMES = ["system", "light", "dark"];
-  var NAMES = { system: "System", light: "Light", dark: "Dark" };
+  var _ = window.COOOLER_I18N._;
+  var plural = window.COOOLER_I18N.plural;
+  var whole = window.COOOLER_I18N.whole;
+  var NAMES = { system: _("System"), light: _("Light"), dark: _("Dark") };
 
   function theme() {
     return root.dataset.theme || "system";
@@ -134,7 +137,9 @@
     var none = section.querySelector(".none");
     if (none) none.hidden = shown > 0;
     var count = section.querySelector("[data-count]");
-    if (count) count.textContent = shown === items.length ? items.length + " videos" : shown + " of " + items.length + " videos";
+    var all = items.length;
+    if (count) count.textContent = shown === all ? plural(all, "{n} video", "{n} videos")
+      : plural(all, "{shown} of {n} video", "{shown} of {n} videos", { shown: whole(shown) });
   }
   if (search) search.addEventListener("input", filter);
   if (select) select.addEventListener("change", filter);

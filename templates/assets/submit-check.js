@@ -2,16 +2,17 @@
 (function () {
   "use strict";
   const check = window.COOOLER_CHECK;
+  const { _ } = window.COOOLER_I18N;
   const COLUMNS = ["video_id", "rank", "description", "label", "track_ids", "frame_indices"];
   const REQUIRED = COLUMNS.slice(0, 3);
   const SHOWN_NAMES = 20;
   const STEP = 5_000;
   const BAD = Symbol("a cell whose fault is noted");
   const CLOSED = {
-    parquet: "a Parquet file, which a page cannot open by itself",
-    scripts: "the JSON of the paper's scripts, whose answers only the command reads",
-    zip: "a zip archive, which this page does not open",
-    zst: "a zstd archive, which a page cannot open by itself",
+    parquet: _("It looks like a Parquet file, which a page cannot open by itself."),
+    scripts: _("It looks like the JSON of the paper's scripts, whose answers only the command reads."),
+    zip: _("It looks like a zip archive, which this page does not open."),
+    zst: _("It looks like a zstd archive, which a page cannot open by itself."),
   };
 
   // Thrown for a file that is recognised, but cannot be opened here.
@@ -168,7 +169,7 @@
         if (refused) throw refused;
         yield* run(content, truth, faults, report);
       } catch (error) {
-        if (error instanceof Closed) report.closed = "It looks like " + CLOSED[error.message] + ".";
+        if (error instanceof Closed) report.closed = CLOSED[error.message];
         else if (!(error instanceof check.Stop)) throw error;
       }
       return { ...report, faults: faults.list() };

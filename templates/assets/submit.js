@@ -1,6 +1,7 @@
 // The submit page: takes a file by choice or drop, checks it without a request, says what is wrong with it.
 (function () {
   "use strict";
+  const { _, plural, whole } = window.COOOLER_I18N;
   const check = window.COOOLER_CHECK;
   const truth = window.COOOLER_SUBMIT;
   const FIRST_SHOWN = 200;
@@ -8,9 +9,9 @@
   const FORMATS = {
     csv: "CSV",
     jsonl: "JSON Lines",
-    coool: "COOOL results",
-    "2coool": "2COOOL results",
-    coco: "COCO caption results",
+    coool: _("COOOL results"),
+    "2coool": _("2COOOL results"),
+    coco: _("COCO caption results"),
   };
   const place = (id) => document.getElementById(id);
   const input = place("file");
@@ -18,10 +19,6 @@
   const result = place("result");
   let latest = 0; // the number of the check that may speak
   let report = null; // what the last check said
-
-  function plural(count, one, many) {
-    return check.commas(count) + " " + (count === 1 ? one : many || one + "s");
-  }
 
   // Run the steps of a check in slices, so that the page stays alive; null when another check began.
   function drive(steps, number) {
@@ -56,7 +53,7 @@
     const number = latest;
     result.hidden = true;
     place("said").textContent = "";
-    place("busy-text").textContent = "Reading " + check.visible(file.name, 100) + " …";
+    place("busy-text").textContent = _("Reading {file} …", { file: check.visible(file.name, 100) });
     place("progress").value = 0;
     place("busy").hidden = false;
     let found;
@@ -64,7 +61,7 @@
       const steps = check.steps(file, truth);
       found = await drive(await steps, number);
     } catch (error) {
-      const closed = "This page cannot read it (" + error.message + ").";
+      const closed = _("This page cannot read it ({problem}).", { problem: error.message });
       found = { format: "", predictions: 0, videos: 0, warnings: [], faults: [], closed };
     }
     if (number !== latest || !found) return;
@@ -75,22 +72,26 @@
 
   function show() {
     const faulty = report.faults.length > 0;
-    const name = report.file;
-    let title = "✓ " + name + " is good";
-    let text = plural(report.predictions, "prediction") + " for " + check.commas(report.videos) + " of ";
-    text += plural(truth.ids.length, "video") + " (" + FORMATS[report.format] + ").";
+    const { file } = report;
+    let mark = "✓";
+    let title = _("{file} is good", { file });
+    let text = sums();
     if (report.closed) {
-      title = "– " + name + " is not checked";
-      text = report.closed + " This command does the same check: coooler check " + name;
+      mark = "–";
+      title = _("{file} is not checked", { file });
+      text = report.closed + " " + _("This command does the same check: coooler check {file}", { file });
     } else if (faulty) {
       const more = report.faults[report.faults.length - 1].more || 0;
-      title = "✕ " + name + " has " + plural(report.faults.length - (more ? 1 : 0) + more, "fault");
+      const n = report.faults.length - (more ? 1 : 0) + more;
+      mark = "✕";
+      title = plural(n, "{file} has {n} fault", "{file} has {n} faults", { file });
       text = counts();
     } else if (report.warnings.length) {
-      title += ", with " + plural(report.warnings.length, "warning");
+      const n = report.warnings.length;
+      title = plural(n, "{file} is good, with {n} warning", "{file} is good, with {n} warnings", { file });
     }
     result.className = "result " + (report.closed ? "closed" : faulty ? "faulty" : "good");
-    place("result-title").textContent = title;
+    place("result-title").textContent = mark + " " + title;
     place("result-text").textContent = text;
     place("warnings").replaceChildren(...report.warnings.map((warning) => made("li", warning)));
     place("warnings").hidden = !report.warnings.length;
@@ -100,21 +101,37 @@
     place("fault-rows").replaceChildren();
     addRows(FIRST_SHOWN);
     result.hidden = false;
-    place("said").textContent = title.slice(2) + ". " + text;
+    place("said").textContent = title + ". " + text;
+  }
+
+  // What a good file holds.
+  function sums() {
+    const n = truth.ids.length;
+    const values = {
+      predictions: plural(report.predictions, "{n} prediction", "{n} predictions"),
+      videos: whole(report.videos),
+      format: FORMATS[report.format],
+    };
+    return plural(
+      n,
+      "{predictions} for {videos} of {n} video ({format}).",
+      "{predictions} for {videos} of {n} videos ({format}).",
+      values,
+    );
   }
 
   // How many faults each column has, the most first.
   function counts() {
     const byColumn = new Map();
     for (const fault of report.faults) {
-      const name = fault.column || (fault.row === null ? "the file" : "whole rows");
+      const name = fault.column || (fault.row === null ? _("the file") : _("whole rows"));
       if (!fault.more) byColumn.set(name, (byColumn.get(name) || 0) + 1);
     }
     const parts = Array.from(byColumn).sort((a, b) => b[1] - a[1]);
-    const list = parts.map(([name, count]) => name + " " + check.commas(count)).join(", ");
-    const last = report.faults[report.faults.length - 1];
-    const rest = last.more ? "; " + check.commas(last.more) + " more are not listed." : ".";
-    return "By column: " + list + rest;
+    const list = parts.map(([name, count]) => name + " " + whole(count)).join(", ");
+    const { more } = report.faults[report.faults.length - 1];
+    return more ? _("By column: {list}; {more} more are not listed.", { list, more: whole(more) })
+      : _("By column: {list}.", { list });
   }
 
   function made(tag, text, name) {
@@ -137,22 +154,23 @@
     for (const fault of report.faults.slice(body.rows.length, limit)) {
       const row = document.createElement("tr");
       row.setAttribute("role", "row");
-      const where = cell("", fault.row === null ? "whole file" : "row " + check.commas(fault.row), "row");
+      const at = fault.row === null ? _("whole file") : _("row {number}", { number: whole(fault.row) });
+      const where = cell("", at, "row");
       if (fault.line !== null && fault.line !== fault.row) {
-        where.append(made("span", " line " + check.commas(fault.line), "sub"));
+        where.append(made("span", " " + _("line {number}", { number: whole(fault.line) }), "sub"));
       }
       row.append(
         where,
-        cell("Column", fault.column || "", "column"),
-        cell("Found", fault.found, "found"),
-        cell("Expected", fault.expected, "expected"),
-        cell("Mend", fault.mend, "mend"),
+        cell(_("Column"), fault.column || "", "column"),
+        cell(_("Found"), fault.found, "found"),
+        cell(_("Expected"), fault.expected, "expected"),
+        cell(_("Mend"), fault.mend, "mend"),
       );
       body.append(row);
     }
     const left = report.faults.length - body.rows.length;
     place("more").hidden = left <= 0;
-    place("more").textContent = "Show the other " + check.commas(left);
+    place("more").textContent = plural(left, "Show the other {n}", "Show the other {n}");
   }
 
   function asText() {
@@ -202,7 +220,8 @@
     } catch (error) {
       done = copiedBySelection(asText());
     }
-    place("tools-said").textContent = done ? "Copied." : "The browser forbids copying; download it instead.";
+    place("tools-said").textContent = done ? _("Copied.")
+      : _("The browser forbids copying; download it instead.");
   }
 
   function save() {
@@ -211,7 +230,7 @@
     link.download = "check.json";
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-    place("tools-said").textContent = "Saved as check.json.";
+    place("tools-said").textContent = _("Saved as {name}.", { name: link.download });
   }
 
   function more() {

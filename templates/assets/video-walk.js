@@ -1,10 +1,11 @@
 // A walk through the list that the visitor came from: {ids, from, title}, left by the page with the list.
 (function () {
   "use strict";
+  const { _ } = window.COOOLER_I18N;
   const TEXT = {
-    where: (place, count, title) => `${place} of ${count} in “${title}”`,
-    previous: "Previous: ",
-    next: "Next: ",
+    where: (n, total, title) => _("{n} of {total} in “{title}”", { n, total, title }),
+    previous: _("Previous:"),
+    next: _("Next:"),
   };
   const KEY = "coooler-walk";
   const PATH = /^videos\/([A-Za-z0-9._-]{1,120})\.html$/;
@@ -34,7 +35,7 @@
     link.href = new URL(path, root).href;
     const spoken = document.createElement("span");
     spoken.className = "sr";
-    spoken.textContent = hint;
+    spoken.textContent = `${hint} `;
     const arrow = document.createElement("span");
     arrow.setAttribute("aria-hidden", "true");
     arrow.textContent = id === "previous" ? "← " : " →";

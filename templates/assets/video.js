@@ -1,10 +1,11 @@
 // The viewer: keyframes by click, drag, slider and arrow keys, neighbours by j and k, boxes by b.
 (function () {
   "use strict";
+  const { _ } = window.COOOLER_I18N;
   const TEXT = {
-    frame: (index, time) => `Frame ${index} · ${time}`,
-    copied: "The link is copied.",
-    notCopied: (link) => `It could not be copied; this is the link: ${link}`,
+    frame: (number, time) => _("Frame {number} · {time}", { number, time }),
+    copied: _("The link is copied."),
+    notCopied: (link) => _("It could not be copied; this is the link: {link}", { link }),
   };
   const SETTLE_MS = 90; // large pictures are asked for when the strip rests, not for every frame passed
   const address = window.COOOLER_ADDRESS;

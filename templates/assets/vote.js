@@ -1,28 +1,44 @@
 // Blind votes: a clip and the captions of two systems, which are named only when the voter asks.
 (function () {
   "use strict";
-  const plural = (n, word) => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
+  const { _, plural, whole } = window.COOOLER_I18N;
   const TEXT = {
-    number: (n) => `Comparison ${n}`,
-    count: (votes, choices) => `${plural(votes, "vote")} of ${choices}`,
-    countTo: (votes, choices, goal) => `${plural(votes, "vote")} of ${choices} · summary at ${goal}`,
-    voted: { left: "A is better.", right: "B is better.", tie: "Tie.", skip: "Skipped." },
-    undone: "Taken back; choose again.",
-    nothing: "There is nothing to take back.",
-    reveal: (video, left, right) => `In ${video}, A was ${left}, B was ${right}.`,
-    saysNothing: "(says nothing)",
-    more: (n) => `and ${plural(n, "more caption")}`,
-    clip: (video) => `The clip of ${video}, without sound`,
-    frame: (video, time) => `${video} at ${time}`,
-    finished: "Finished",
-    finishedHow: "Export your votes.",
-    exported: (votes) => `${plural(votes, "vote")} exported.`,
-    empty: "There is no vote to export yet.",
-    restart: (votes) => `Forget ${plural(votes, "vote")} and begin anew?`,
-    restarted: "A new start.",
-    unloaded: "The data of this page could not be loaded. Reload it, or get the site's whole folder again.",
-    facts: ["Votes", "A better", "B better", "Ties", "Skipped", "Pairs of systems met", "Videos seen"],
-    of: (part, whole) => `${part} of ${whole}`,
+    number: (n) => _("Comparison {n}", { n }),
+    count: (votes, choices) =>
+      plural(votes, "{n} vote of {total}", "{n} votes of {total}", { total: whole(choices) }),
+    countTo: (votes, choices, goal) => plural(
+      votes,
+      "{n} vote of {total} · summary at {goal}",
+      "{n} votes of {total} · summary at {goal}",
+      { total: whole(choices), goal },
+    ),
+    voted: { left: _("A is better."), right: _("B is better."), tie: _("Tie."), skip: _("Skipped.") },
+    undone: _("Taken back; choose again."),
+    nothing: _("There is nothing to take back."),
+    reveal: (video, left, right) => _("In {video}, A was {left}, B was {right}.", { video, left, right }),
+    saysNothing: _("(says nothing)"),
+    more: (n) => plural(n, "and {n} more caption", "and {n} more captions"),
+    clip: (video) => _("The clip of {video}, without sound", { video }),
+    frame: (video, time) => _("{video} at {time}", { video, time }),
+    finished: _("Finished"),
+    finishedHow: _("Export your votes."),
+    exported: (votes) => plural(votes, "{n} vote exported.", "{n} votes exported."),
+    empty: _("There is no vote to export yet."),
+    restart: (votes) =>
+      plural(votes, "Forget {n} vote and begin anew?", "Forget {n} votes and begin anew?"),
+    restarted: _("A new start."),
+    unloaded: _("The data of this page could not be loaded. Reload it, or get the site's whole folder "
+      + "again."),
+    facts: [
+      _("Votes"),
+      _("A better"),
+      _("B better"),
+      _("Ties"),
+      _("Skipped"),
+      _("Pairs of systems met"),
+      _("Videos seen"),
+    ],
+    of: (n, total) => _("{n} of {total}", { n, total }),
   };
   const SET = 20; // votes until the summary opens
 
@@ -182,7 +198,7 @@
     const votes = ballot.votes();
     const goal = Math.min(data.choices, (Math.floor(votes.length / SET) + 1) * SET);
     const count = current ? TEXT.countTo : TEXT.count;
-    page("vote-count").textContent = count(votes.length, data.choices.toLocaleString("en"), goal);
+    page("vote-count").textContent = count(votes.length, data.choices, goal);
     page("vote-bar").max = goal;
     page("vote-bar").value = votes.length;
     page("vote-reveal").checked = state.reveal;

@@ -1,0 +1,13 @@
+"""The commands of `coooler data`: from raw clips and annotations to a benchmark."""
+
+import typer
+
+from sitegen.cli_data_check import check
+from sitegen.cli_data_import import import_coool
+from sitegen.cli_data_split import card, split
+
+data = typer.Typer(help="Tools for the data of a benchmark.", rich_markup_mode=None)
+
+data.command("import-coool")(import_coool)
+for command in (check, split, card):
+    data.command()(command)
