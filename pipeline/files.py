@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 if sys.platform != "win32":
     import fcntl
@@ -86,6 +87,15 @@ def replacing(path: Path) -> Iterator[Path]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def fsynced(path: Path) -> Iterator[BinaryIO]:
+    """A file to write into, on the disk when the body ends; for one that nobody reads before."""
+    with path.open("wb") as target:
+        yield target
+        target.flush()
+        os.fsync(target.fileno())
 
 
 def write_bytes(path: Path, data: bytes) -> None:

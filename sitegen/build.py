@@ -4,14 +4,12 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from pipeline.benchmark import Benchmark
-from pipeline.errors import InputError, OutsideError
+from pipeline.errors import InputError
 from pipeline.files import sha256_of
 from pipeline.interfaces import Embedder
 from sitegen.blame import blame_board
@@ -20,10 +18,12 @@ from sitegen.charts import script_json
 from sitegen.data_check_run import inputs_of, stored_check
 from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
 from sitegen.gathered import SiteData, VideoMedia, path_names
-from sitegen.language import ENGLISH, gettext, marked, ngettext, speaking, whole
+from sitegen.language import ENGLISH, speaking
+from sitegen.manifest import Content
 from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json
-from sitegen.output import Output, open_output, stamped, tree_sha256
-from sitegen.pages import Page, data_files, make_pages
+from sitegen.output import Output, open_output
+from sitegen.pages import data_files, make_pages
+from sitegen.rendering import code_sha256, find_locale, find_templates, render
 from sitegen.standings import Standing
 
 if TYPE_CHECKING:
@@ -79,23 +79,31 @@ def build_site(
     names = path_names(truth)
     boxes = read_boxes(benchmark, truth)
     output = open_output(out)
-    todo = media_jobs(benchmark, names, boxes, settings or MediaSettings())
+    contents: dict[str, Content] = {}
+
+    def clip_sha256(clip: Path) -> str:
+        contents[clip.name] = output.before.content(clip)
+        return contents[clip.name][0]
+
+    todo = media_jobs(benchmark, names, boxes, settings or MediaSettings(), clip_sha256)
     media, remembered, decoded = _all_media(output, todo, jobs, tell)
     data = gather(benchmark, truth, boxes, media, board, as_of)
     if not data.hidden:
         rows = [row for found in truth.values() for row in found]
         clips = {job.video_id: job.clip_sha256 for job in todo}
         data = replace(data, check=stored_check(benchmark.root, inputs_of(rows, benchmark.boxes, clips)))
-    digest = put_pages(output, data, embedder, tell)
-    removed = output.finish(remembered)
+    inputs = sha256_of(f"{code_sha256()} {embedder.sha256 if embedder else ''} {data!r}".encode())
+    digest = output.before.tree if output.keep_all(inputs) else put_pages(output, data, embedder, tell)
+    output.finish(digest, remembered, inputs, contents)
     if data.hidden:
         _nothing_left(output)
     size = sum(output.sizes.values())
-    return BuildReport(out, output.written, output.unchanged, removed, decoded, digest, size)
+    return BuildReport(out, output.written, output.unchanged, output.removed, decoded, digest, size)
 
 
 def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: Tell) -> str:
     """Put all of a site but its pictures, which are there, into `output`; give the tree's hash."""
+    code = code_sha256()
     output.add_all(_assets(with_charts=bool(data.systems)))
     total = len(data.names) + len(data.systems) + 8 + (not data.restored.is_empty)
     language = data.settings.language
@@ -103,14 +111,14 @@ def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: T
         if embedder and not data.hidden:
             data = _with_blame(data, embedder)
         output.add_all(data_files(data))
-        pages = _rendered(make_pages(data), data.settings.address, total, tell)
+        for done, page in enumerate(make_pages(data), start=1):
+            key = page.shows and sha256_of(f"{page.shows} {data.settings.address} {code}".encode())
+            output.add_page(page.path, key, partial(render, page, data.settings.address))
+            tell("Rendering pages", done, total)
     if language != ENGLISH.tag:
         messages = script_json(script_messages(language, find_locale()))
         output.add_all([(CATALOGUE, f"window.COOOLER_CATALOGUE = {messages};\n".encode())])
-    blank = {path: sha256_of(page) for path, page in pages.items()}
-    digest = tree_sha256({**output.files, **blank})
-    output.add_all((path, stamped(page, digest)) for path, page in pages.items())
-    return digest
+    return output.stamp()
 
 
 def _with_blame(data: SiteData, embedder: Embedder) -> SiteData:
@@ -133,59 +141,6 @@ def _telling(bar: "Progress | None") -> Tell:
         bar.update(lines[what], completed=done)
 
     return tell
-
-
-def find_templates() -> Path:
-    """The folder of templates: in the installed package, or at the root of the checkout.
-
-    Raises OutsideError when it is in neither place.
-    """
-    here = Path(__file__).resolve().parent
-    for folder in (here / "templates", here.parent / "templates"):
-        if (folder / "base.html").is_file():
-            return folder
-    raise OutsideError(f"{here}: the templates are missing. Install COOOLER again.")
-
-
-def find_locale() -> Path:
-    """The folder of the catalogues that pages are translated by."""
-    return find_templates() / "locale"
-
-
-@cache
-def environment() -> Environment:
-    """The jinja environment: everything escaped, an undefined name is an error; one a process."""
-    made = Environment(
-        loader=FileSystemLoader(find_templates()),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        extensions=["jinja2.ext.i18n"],
-    )
-    made.install_gettext_callables(gettext, ngettext, newstyle=True)  # type: ignore[attr-defined]
-    made.filters |= {"marked": marked, "whole": whole}
-    return made
-
-
-def _rendered(pages: Iterator[Page], address: str, total: int, tell: Tell) -> dict[str, bytes]:
-    """Path -> page with an empty place for the tree's hash. Raises ValueError for a path that comes twice.
-
-    A page's canonical link is under `address`, where the site will be seen, or the page itself.
-    """
-    env = environment()
-    rendered: dict[str, bytes] = {}
-    for done, page in enumerate(pages, start=1):
-        if page.path in rendered:
-            raise ValueError(f"{page.path}: two pages of one path")
-        canonical = f"{address}{page.path}" if address else page.path.rpartition("/")[2]
-        text = env.get_template(page.template).render(
-            page=page.context, shell=page.context.shell, canonical=canonical
-        )
-        rendered[page.path] = text.encode()
-        tell("Rendering pages", done, total)
-    return rendered
 
 
 def _nothing_left(output: Output) -> None:
@@ -226,26 +181,26 @@ def _all_media(
             media[job.video_id], remembered[job.video_id] = kept
     for done, (job, made) in enumerate(_make_all(missing, jobs), start=1):
         output.add_all(made.files)
-        media[job.video_id] = made.media
-        remembered[job.video_id] = {
-            "key": job.key,
-            "files": {path: output.files[path] for path, _ in made.files},
-            "media": media_to_json(made.media),
-        }
+        files = {path: output.files[path] for path, _ in made.files}
+        entry = {"key": job.key, "files": files, "media": media_to_json(made.media)}
+        output.note(job.name, entry)
+        media[job.video_id], remembered[job.video_id] = made.media, entry
         tell("Cutting keyframes", done, len(missing))
-    return media, remembered, len(missing)
+    return dict(sorted(media.items())), remembered, len(missing)
 
 
 def _kept(output: Output, job: MediaJob) -> tuple[VideoMedia, Any] | None:
-    """The pictures that an earlier build made of the same things, when they are still there."""
-    entry = output.before.get("media", {}).get(job.video_id)
-    if not isinstance(entry, dict) or entry.get("key") != job.key:
-        return None
-    try:
-        found = media_from_json(entry["media"])
-        return (found, entry) if output.kept(entry["files"]) else None
-    except (KeyError, TypeError, ValueError, AttributeError):
-        return None
+    """The pictures that an earlier or a killed build made of the same things, when they are still there."""
+    for entry in (output.before.media.get(job.video_id), output.noted(job.name)):
+        if not isinstance(entry, dict) or entry.get("key") != job.key:
+            continue
+        try:
+            found = media_from_json(entry["media"])
+            if output.kept(entry["files"]):
+                return found, entry
+        except (KeyError, TypeError, ValueError, AttributeError):
+            continue
+    return None
 
 
 def _make_all(todo: Sequence[MediaJob], jobs: int) -> Iterator[tuple[MediaJob, MadeMedia]]:

@@ -37,7 +37,9 @@ def demo_folder(work: Path | None) -> Benchmark:
     if not target.exists():
         partial = target.with_name(f".{target.name}.partial")
         shutil.rmtree(partial, ignore_errors=True)
-        shutil.copytree(source, partial, ignore=shutil.ignore_patterns("runs", "submissions", ".coooler-clips.parquet"))
+        shutil.copytree(
+            source, partial, ignore=shutil.ignore_patterns("runs", "submissions", ".coooler-clips.parquet")
+        )
         partial.rename(target)
     if not (target / FILE_NAME).is_file():
         raise ConfigError(f"{target}: exists and is no benchmark folder; expected a new path (--work).")

@@ -1,11 +1,11 @@
 """Reads what a site is made of: truth, boxes, records of pipeline runs, clips."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TypeVar
 
 from pipeline.benchmark import Benchmark
 from pipeline.errors import ConfigError
-from pipeline.files import sha256_file
 from pipeline.records import (
     Match,
     Snippet,
@@ -73,13 +73,14 @@ def media_jobs(
     names: Mapping[str, str],
     boxes: Mapping[str, tuple[TrackBox, ...]],
     settings: MediaSettings,
+    clip_sha256: Callable[[Path], str],
 ) -> list[MediaJob]:
     """What every video's pictures are made of, in the order of the ids."""
     clips = {path.stem: path for path in sorted(benchmark.videos.glob("*")) if path.suffix.lower() in CLIPS}
     jobs = []
     for video_id, name in sorted(names.items()):
         clip = clips.get(video_id)
-        digest = sha256_file(clip) if clip else ""
+        digest = clip_sha256(clip) if clip else ""
         shown = benchmark.settings.show_videos
         jobs.append(MediaJob(video_id, name, clip, digest, boxes.get(video_id, ()), shown, settings))
     return jobs

@@ -16,7 +16,6 @@ from starlette.staticfiles import StaticFiles
 from pipeline.benchmark import Benchmark
 from pipeline.errors import InputError
 from sitegen import about as about_file
-from sitegen.build import find_templates
 from sitegen.intake import Intake, QueueFullError
 from sitegen.intake_form import read_bare, read_form, too_large
 from sitegen.intake_limits import (
@@ -32,6 +31,7 @@ from sitegen.intake_pages import as_json, status_page, upload_page, visible_line
 from sitegen.intake_records import Details, Report, Upload
 from sitegen.intake_worker import Worker, sender_of
 from sitegen.readers import FORMATS
+from sitegen.rendering import find_templates
 from sitegen.serve import TYPES, find_file
 
 _STATIC = {

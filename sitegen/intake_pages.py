@@ -8,7 +8,6 @@ from typing import Any
 
 from pipeline import __version__
 from pipeline.benchmark import Benchmark
-from sitegen.build import environment, find_locale
 from sitegen.catalogues import read_language
 from sitegen.contexts import Fact, Shell
 from sitegen.intake_records import FIELDS, Report, Upload
@@ -18,6 +17,7 @@ from sitegen.numerals import percent, plural
 from sitegen.output import BLANK, stamped
 from sitegen.readers import FORMATS
 from sitegen.rehearsal import METRICS, rank_words
+from sitegen.rendering import environment, find_locale
 from sitegen.words import visible
 
 REFRESH_S = 3

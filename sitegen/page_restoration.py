@@ -87,8 +87,8 @@ def restoration_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
 
 def restored_href(data: SiteData, video_id: str) -> str:
     """Where a video's pictures before and after are, from the site's root; empty when it has none."""
-    name = data.restored.names.get(video_id)
-    return f"{PATH}#clip-{name}" if name else ""
+    clip = data.restored.by_video.get(video_id)
+    return f"{PATH}#clip-{clip.name}" if clip else ""
 
 
 def _clip(data: SiteData, one: Restoration) -> ClipView:

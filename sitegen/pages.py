@@ -1,10 +1,12 @@
 """All data of a site to its pages and data files. Pure: nothing is read or written here."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 from pipeline import __version__
+from pipeline.files import sha256_of
 from sitegen import charts
 from sitegen.board_files import board_files
 from sitegen.compare_files import compare_files
@@ -15,6 +17,7 @@ from sitegen.failures import Blame
 from sitegen.gathered import SiteData, System
 from sitegen.language import ENGLISH, ngettext, speaking
 from sitegen.language import gettext as _
+from sitegen.narrowed import of_video
 from sitegen.page_board import leaderboard_page, video_href, videos_page
 from sitegen.page_compare import ComparePage, compare_page
 from sitegen.page_data import DataPage, data_page
@@ -53,11 +56,15 @@ LEDGER = "data/ledger.jsonl"
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A page to render: its path from the site's root, its template, what the template is given."""
+    """A page to render: its path from the site's root, its template, how to make what that is given.
+
+    `shows` is the hash of all that decides the page, but for the code; empty where that is not known.
+    """
 
     path: str
     template: str
-    context: Context
+    make: Callable[[], Context]
+    shows: str = ""
 
 
 def make_pages(data: SiteData) -> Iterator[Page]:
@@ -69,39 +76,43 @@ def make_pages(data: SiteData) -> Iterator[Page]:
     shell = _shell(data, data.settings.name, about, "", "leaderboard")
     downloads = () if data.is_rehearsal else tuple(Link(name, path) for name, path, _made in FORMATS)
     ledger = LEDGER if data.ledger_file else ""
-    context = leaderboard_page(data, shell, BOARD_FIGURES, downloads, ledger)
-    yield Page("index.html", "leaderboard.html", context)
+    made = partial(leaderboard_page, data, shell, BOARD_FIGURES, downloads, ledger)
+    yield Page("index.html", "leaderboard.html", made)
     about = _("All {n} videos.") if data.hidden else _("All {n} videos with their hazards.")
     shell = _shell(data, _("Videos"), about.format(n=len(data.truth)), "", "videos")
-    yield Page("videos.html", "videos.html", videos_page(data, shell))
+    yield Page("videos.html", "videos.html", partial(videos_page, data, shell))
     yield from _video_pages(data)
     for system in data.systems:
         about = _("{system}: scores, every video, provenance.").format(system=visible(system.name))
         shell = _shell(data, visible(system.name), about, "../", "leaderboard")
-        yield Page(f"submissions/{system.slug}.html", "submission.html", submission_page(data, system, shell))
+        yield Page(
+            f"submissions/{system.slug}.html",
+            "submission.html",
+            partial(submission_page, data, system, shell),
+        )
     if not data.hidden:
         about = _("Every hazard that a system missed, where it was lost, and every wrong caption.")
         shell = _shell(data, _("Failures"), about, "", "failures")
-        yield Page("failures.html", "failures.html", failures_page(data, _blames(data), shell))
+        yield Page("failures.html", "failures.html", partial(failures_page, data, _blames(data), shell))
         about = _("Two systems on the same videos: per-video differences, paired tests, who detects what.")
         shell = _shell(data, _("Compare"), about, "", "compare")
-        yield Page("compare.html", "compare.html", compare_page(data, shell))
+        yield Page("compare.html", "compare.html", partial(compare_page, data, shell))
     about = _("The format of a predictions file, a check of it in your browser, and the ways to send it.")
     shell = _shell(data, _("Submit"), about, "", "submit")
-    yield Page("submit.html", "submit.html", submit_page(data, shell))
+    yield Page("submit.html", "submit.html", partial(submit_page, data, shell))
     about = _("Which of two captions describes the hazard better? Two at a time, without names.")
     shell = _shell(data, _("Vote"), about, "", "vote")
-    yield Page("vote.html", "vote.html", vote_page(data, shell))
+    yield Page("vote.html", "vote.html", partial(vote_page, data, shell))
     about = _("What the data hold: descriptions, labels, boxes, clips, and what a check of them found.")
     shell = _shell(data, _("About the data"), about, "", "data")
-    yield Page("data.html", "data.html", data_page(data, shell))
+    yield Page("data.html", "data.html", partial(data_page, data, shell))
     if not data.restored.is_empty:
         about = _("What was done to the clips, by which method, and a frame of each before and after.")
         shell = _shell(data, _("Restored clips"), about, "", "videos")
-        yield Page(RESTORATION, "restoration.html", restoration_page(data, shell))
+        yield Page(RESTORATION, "restoration.html", partial(restoration_page, data, shell))
     about = _("What BESM, SAM, detection and hazard recall are, with an example; prompts, models, sources.")
     shell = _shell(data, _("Method"), about, "", "method")
-    yield Page("method.html", "method.html", method_page(data, shell))
+    yield Page("method.html", "method.html", partial(method_page, data, shell))
 
 
 def _video_pages(data: SiteData) -> Iterator[Page]:
@@ -117,15 +128,21 @@ def _video_pages(data: SiteData) -> Iterator[Page]:
                 video=shown, labels=labels
             )
         shell = _shell(data, title, shorten(about, 160), "../", "videos")
-        boxes, media = data.boxes.get(video_id, ()), data.media[video_id]
-        heard = [made for system in data.systems if (made := transcript(system, video_id, boxes, media))]
         where = Place(
             links[place - 1] if place else None,
             links[place + 1] if place + 1 < len(ids) else None,
             _("{n} of {total}").format(n=place + 1, total=len(ids)),
         )
-        context = video_page(data, video_id, shell, heard, where)
-        yield Page(links[place].href, "video.html", context)
+        view = of_video(data, video_id)
+        shows = sha256_of(repr((view, shell, where)).encode(errors="replace"))
+        made = partial(_video_page, view, video_id, shell, where)
+        yield Page(links[place].href, "video.html", made, shows)
+
+
+def _video_page(view: SiteData, video_id: str, shell: Shell, place: Place) -> VideoPage:
+    boxes, media = view.boxes[video_id], view.media[video_id]
+    heard = [made for system in view.systems if (made := transcript(system, video_id, boxes, media))]
+    return video_page(view, video_id, shell, heard, place)
 
 
 def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:

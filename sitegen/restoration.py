@@ -6,6 +6,7 @@ Records and pictures come from outside: one that is broken is told of and left o
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -86,7 +87,7 @@ class Restoration:
     overlay: Picture | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Restorations:
     """All restored clips, by id, and what is wrong with the records that could not be used."""
 
@@ -98,10 +99,10 @@ class Restorations:
         """Whether there is nothing to show."""
         return not self.clips and not self.problems
 
-    @property
-    def names(self) -> Mapping[str, str]:
-        """Video id -> path part, of the clips there are."""
-        return {clip.record.video_id: clip.name for clip in self.clips}
+    @cached_property
+    def by_video(self) -> Mapping[str, Restoration]:
+        """Video id -> its restored clip."""
+        return {clip.record.video_id: clip for clip in self.clips}
 
 
 def read_restorations(videos: Path) -> Restorations:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pipeline import __version__
 from pipeline.errors import InputError
-from sitegen.build import find_templates
 from sitegen.checks import visible
+from sitegen.rendering import find_templates
 
 FILES: dict[str, str] = {
     "coooler.toml": "coooler.toml",

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from sitegen.build import find_templates
+from sitegen.rendering import find_templates
 
 OPEN_BYTES = 300 * 1024
 """What opening a video page may load, all its pictures included; a clip loads when it is played.

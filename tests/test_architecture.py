@@ -100,8 +100,8 @@ FLOORS = [
         "sitegen.failures",
         "sitegen.intake_records",
         "sitegen.ledger",
+        "sitegen.manifest",
         "sitegen.numerals",
-        "sitegen.output",
         "sitegen.serve",
     ],
     [
@@ -111,6 +111,7 @@ FLOORS = [
         "sitegen.figure2",
         "sitegen.formats",
         "sitegen.intake",
+        "sitegen.output",
         "sitegen.phrases",
         "sitegen.probe_words",
         "sitegen.restoration",
@@ -165,6 +166,7 @@ FLOORS = [
         "sitegen.failure_files",
         "sitegen.hiding",
         "sitegen.media",
+        "sitegen.narrowed",
         "sitegen.page_data",
         "sitegen.page_method",
         "sitegen.page_submit",
@@ -204,13 +206,16 @@ FLOORS = [
         "sitegen.pages",
     ],
     [
-        "sitegen.build",
+        "sitegen.rendering",
     ],
     [
-        "sitegen.board",
+        "sitegen.build",
         "sitegen.intake_pages",
         "sitegen.scaffold",
         "sitegen.strict",
+    ],
+    [
+        "sitegen.board",
     ],
     [
         "sitegen.cli_common",

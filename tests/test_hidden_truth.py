@@ -12,6 +12,7 @@ import pytest
 
 from pipeline.benchmark import Benchmark
 from pipeline.errors import InputError
+from pipeline.files import sha256_file
 from sitegen.build import build_site
 from sitegen.gather import gather, media_jobs, read_boxes, read_truth_by_video
 from sitegen.gathered import VideoMedia, path_names
@@ -190,7 +191,9 @@ def test_the_pages_are_given_nothing_of_the_truth(made: tuple[Benchmark, Board])
         assert not any(row.track_ids or row.frame_indices for row in system.evaluation.submission.predictions)
         assert not any(said.snippets or said.matches for said in system.records.values())
         assert any(said.stages for said in system.records.values())
-    jobs = media_jobs(benchmark, path_names(truth), read_boxes(benchmark, truth), MediaSettings())
+    jobs = media_jobs(
+        benchmark, path_names(truth), read_boxes(benchmark, truth), MediaSettings(), sha256_file
+    )
     assert not any(job.boxes for job in jobs)
 
 

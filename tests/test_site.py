@@ -118,7 +118,7 @@ def test_stale_files_go_and_foreign_files_stay(
     outside = tmp_path / "outside.txt"
     outside.write_text("keep", encoding="utf-8")
     manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
-    manifest["files"]["../outside.txt"] = "0" * 64
+    manifest["files"]["../outside.txt"] = ["0" * 64, 4]
     (out / MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
     board = [entry for entry in small[1] if entry[0].slug != "silent"]
     report = build_site(small[0], out, board)

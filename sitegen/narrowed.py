@@ -1,0 +1,60 @@
+"""What the page of one video shows of a site's data, and nothing else: the rest cannot change the page."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from itertools import takewhile
+
+from pipeline.scores import Evaluation, Scorecard, Signature, Submission
+from sitegen.failures import Blame, Failure
+from sitegen.gathered import SiteData, System
+from sitegen.restoration import Restorations
+from sitegen.uncertainty import Interval, Uncertainty
+
+_NAN = float("nan")
+_NO_CARD = Scorecard(_NAN, _NAN, _NAN, None, 0, Signature("", "", "", "", 0, _NAN))
+_NO_INTERVAL = Interval(_NAN, _NAN)
+_UNSURE = Uncertainty(_NO_INTERVAL, _NO_INTERVAL, _NO_INTERVAL, None, 0, 0, 0, _NAN)
+
+
+def of_video(data: SiteData, video_id: str) -> SiteData:
+    """The data of one video: its truth, boxes and pictures, and of each system its words and scores there.
+
+    No totals and no ranks: systems keep their order alone.
+    """
+    restored = data.restored.by_video.get(video_id)
+    return SiteData(
+        data.settings,
+        {video_id: data.truth[video_id]},
+        {video_id: data.boxes.get(video_id, ())},
+        {video_id: data.media[video_id]},
+        {video_id: data.names[video_id]},
+        tuple(_system(system, video_id) for system in data.systems),
+        restored=Restorations((restored,) if restored else ()),
+    )
+
+
+def _system(system: System, video_id: str) -> System:
+    score = system.scores.get(video_id)
+    said = tuple(system.predictions.get(video_id, ()))
+    pairs = tuple(system.pairs.get(video_id, ()))
+    records = system.records.get(video_id)
+    blame = system.blame and Blame(failures_of(system.blame.failures, video_id), ())
+    return System(
+        0,
+        0,
+        system.slug,
+        system.agents,
+        system.is_baseline,
+        Evaluation(Submission(system.name, "", "", "", "", said), pairs, (score,) if score else (), _NO_CARD),
+        _UNSURE,
+        "",
+        records={video_id: records} if records else {},
+        rehearsed=system.rehearsed,
+        blame=blame,
+    )
+
+
+def failures_of(failures: Sequence[Failure], video_id: str) -> tuple[Failure, ...]:
+    """The failures on one video, of all that are sorted by video."""
+    start = bisect_left(failures, video_id, key=lambda failure: failure.video_id)
+    return tuple(takewhile(lambda failure: failure.video_id == video_id, failures[start:]))
