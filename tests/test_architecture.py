@@ -26,6 +26,8 @@ FLOORS = [
         "pipeline.clip_preprocess",
         "pipeline.config",
         "pipeline.data.coool_pickle",
+        "pipeline.data.encode",
+        "pipeline.data.keyboxes",
         "pipeline.data.unpickle",
         "pipeline.data.watermark_find",
         "pipeline.execute",
@@ -46,6 +48,9 @@ FLOORS = [
         "pipeline.clip_networks",
         "pipeline.data.clip_facts",
         "pipeline.data.coool_checks",
+        "pipeline.data.decode",
+        "pipeline.data.picture_files",
+        "pipeline.data.plan",
         "pipeline.data.restored_pictures",
         "pipeline.data.watermark",
         "pipeline.local_llm",
@@ -61,6 +66,9 @@ FLOORS = [
     ],
     [
         "pipeline.clip",
+        "pipeline.data.cut",
+        "pipeline.data.frames",
+        "pipeline.data.overlay",
         "pipeline.embedded_language",
         "pipeline.embedded_vision",
         "pipeline.endpoint",
@@ -68,6 +76,7 @@ FLOORS = [
         "pipeline.stages",
     ],
     [
+        "pipeline.data.rebuild",
         "pipeline.desk",
         "pipeline.models",
     ],
@@ -226,15 +235,17 @@ FLOORS = [
     [
         "sitegen.cli_board",
         "sitegen.cli_data_check",
+        "sitegen.cli_data_frames",
         "sitegen.cli_data_split",
         "sitegen.cli_files",
         "sitegen.intake_app",
     ],
     [
-        "sitegen.cli_data",
+        "sitegen.cli_data_rebuild",
         "sitegen.intake_server",
     ],
     [
+        "sitegen.cli_data",
         "sitegen.cli_site",
     ],
     [
