@@ -13,6 +13,7 @@ from pipeline.records import (
     Match,
     Parse,
     Prediction,
+    Reaction,
     Reply,
     Snippet,
     Stage,
@@ -229,6 +230,14 @@ MATCHES: Table[Match] = Table(
     lambda row: Match(**row),
 )
 
+REACTIONS: Table[Reaction] = Table(
+    "reactions",
+    _schema(("frame_index",), video_id=_STRING, frame_index=_INT, score=_REAL, signal_hz=pa.list_(_REAL)),
+    lambda reaction: (reaction.video_id,),
+    _plain,
+    lambda row: Reaction(**{**row, "signal_hz": tuple(row["signal_hz"])}),
+)
+
 OUTCOMES: Table[VideoOutcome] = Table(
     "outcomes",
     _schema(
@@ -299,6 +308,7 @@ TABLES: tuple[Table[Any], ...] = (
     STAGES,
     SNIPPETS,
     MATCHES,
+    REACTIONS,
     OUTCOMES,
     USAGE,
     PAIRS,

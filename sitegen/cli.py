@@ -5,6 +5,7 @@ import typer
 from pipeline.cli import app, main
 from sitegen.cli_board import build, submit, verify, withdraw
 from sitegen.cli_data import data
+from sitegen.cli_export import export
 from sitegen.cli_files import check, compare, score
 from sitegen.cli_site import demo, init, serve, votes_import
 
@@ -17,6 +18,7 @@ votes = typer.Typer(help="Votes of people on pairs of captions: import.", rich_m
 votes.command("import")(votes_import)
 app.add_typer(votes, name="votes", no_args_is_help=True)
 app.add_typer(data, name="data", no_args_is_help=True)
+app.add_typer(export, name="export", no_args_is_help=True)
 
 if __name__ == "__main__":
     main()

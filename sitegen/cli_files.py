@@ -20,6 +20,7 @@ from sitegen.cli_common import (
     say_warnings,
     submission_of,
 )
+from sitegen.cli_score_coool import ClipsOption, CooolOption, DriverTruthOption, score_coool
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -127,9 +128,17 @@ def score(
     source_format: FormatOption = "",
     caption_column: CaptionOption = "",
     video_map: MapOption = None,
+    coool: CooolOption = False,
+    driver_truth: DriverTruthOption = None,
+    videos: ClipsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Score a predictions file: BESM, SAM, detection rate, hazard recall, with 95 % intervals."""
+    if coool:
+        score_coool(file, truth, driver_truth, videos, video_map, as_json=as_json)
+        return
+    if driver_truth or videos:
+        raise typer.BadParameter("found --driver-truth or --videos; expected --coool with them.")
     from pipeline.minilm import open_embedder
     from sitegen.evaluate import evaluate, truth_sha256
     from sitegen.readers import read_truth

@@ -4,7 +4,7 @@ Both as PAPER, section 4, describes them: captions come back, and for COOOL the 
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,6 +56,27 @@ class _Cells:
         return None
 
 
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A track and its caption in a frame: clean, empty where the cell is; `place` counts the slots' cells."""
+
+    place: int
+    column: str
+    track: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRow:
+    """One row of COOOL results: a frame, the driver's state as it is written, the slots that are filled."""
+
+    row: int
+    video: str
+    frame: int
+    state: str
+    slots: tuple[Slot, ...]
+
+
 def coool(data: bytes, faults: Faults) -> Captions:
     """The captions of COOOL results: for each video, track and caption the frames in which it stands.
 
@@ -63,52 +84,71 @@ def coool(data: bytes, faults: Faults) -> Captions:
     without a track has no `track_ids`; a track without a caption is counted in a warning.
     """
     captions = Captions("ID")
-    frame_rows: dict[str, dict[int, int]] = {}
     videos: dict[str, dict[tuple[str, str], _Seen]] = {}
-    tracks, names = _Cells(_track, faults), _Cells(checks.description, faults)
     untold = 0
-    with csv_rows(data, faults, spaced=True) as rows:
-        header = _slots(next(rows, []), faults)
-        for row, cells in enumerate(rows, start=1):
-            limit_rows(row, faults)
-            place = _frame(cells[0], row, frame_rows, faults)
-            if len(cells) > len(header) and "".join(cells[len(header) :]).strip():
-                faults.add(
-                    row, None, f"{len(cells)} cells", f"at most {len(header)}, as in the header", _QUOTE
-                )
+    for read in frame_rows(data, faults):
+        captions.rows.setdefault(read.video, read.row)
+        for slot in read.slots:
+            if not slot.name:
+                untold += 1
                 continue
-            slots = cells[2 : len(header)]
-            if place is None or not "".join(slots).strip():
-                continue
-            video, frame = place
-            for slot in range(0, len(slots), 2):
-                raw_track = slots[slot].strip()
-                if slot + 1 == len(slots):
-                    if raw_track:
-                        found = f"the track '{visible(raw_track)}' without a cell for its caption"
-                        faults.add(row, header[slot + 2], found, "a track and its caption", _QUOTE)
-                    break
-                raw_name = slots[slot + 1].strip()
-                if not raw_name:
-                    untold += bool(raw_track)
-                    continue
-                track = tracks.clean(raw_track, row, header[slot + 2]) if raw_track else ""
-                name = names.clean(raw_name, row, header[slot + 3])
-                if track is None or name is None:
-                    continue
-                of_video = videos.setdefault(video, {})
-                seen = of_video.get((track, name))
-                if seen is None:
-                    seen = of_video[track, name] = _Seen(row, header[slot + 3], (frame, slot))
-                seen.first = min(seen.first, (frame, slot))
-                seen.frames.add(frame)
-    captions.rows = {video: min(of_frames.values()) for video, of_frames in frame_rows.items()}
+            of_video = videos.setdefault(read.video, {})
+            seen = of_video.get((slot.track, slot.name))
+            if seen is None:
+                first = (read.frame, slot.place)
+                seen = of_video[slot.track, slot.name] = _Seen(read.row, slot.column, first)
+            seen.first = min(seen.first, (read.frame, slot.place))
+            seen.frames.add(read.frame)
     for video, of_video in videos.items():
         captions.predictions += _ranked(video, of_video, faults)
     if untold:
         places = counted(untold, "track in a frame has", "tracks in frames have")
         captions.warnings.append(f"{places} no caption and thus no prediction.")
     return captions
+
+
+def frame_rows(data: bytes, faults: Faults) -> Iterator[FrameRow]:
+    """The rows of COOOL results, those with a fault in their ID left out; what is wrong goes to `faults`."""
+    places: dict[str, dict[int, int]] = {}
+    tracks, names = _Cells(_track, faults), _Cells(checks.description, faults)
+    with csv_rows(data, faults, spaced=True) as rows:
+        header = _slots(next(rows, []), faults)
+        for row, cells in enumerate(rows, start=1):
+            limit_rows(row, faults)
+            place = _frame(cells[0], row, places, faults)
+            if len(cells) > len(header) and "".join(cells[len(header) :]).strip():
+                faults.add(
+                    row, None, f"{len(cells)} cells", f"at most {len(header)}, as in the header", _QUOTE
+                )
+                continue
+            if place is None:
+                continue
+            slots = cells[2 : len(header)]
+            filled = _filled(slots, header, row, tracks, names) if "".join(slots).strip() else ()
+            yield FrameRow(row, *place, cells[1].strip() if len(cells) > 1 else "", filled)
+
+
+def _filled(
+    slots: Sequence[str], header: Sequence[str], row: int, tracks: _Cells, names: _Cells
+) -> tuple[Slot, ...]:
+    """The slots of a row that hold something; one with a fault is left out."""
+    found: list[Slot] = []
+    for place in range(0, len(slots), 2):
+        column = header[place + 2]
+        raw_track = slots[place].strip()
+        if place + 1 == len(slots):
+            if raw_track:
+                what = f"the track '{visible(raw_track)}' without a cell for its caption"
+                tracks.faults.add(row, column, what, "a track and its caption", _QUOTE)
+            break
+        raw_name = slots[place + 1].strip()
+        if not (raw_track or raw_name):
+            continue
+        track = tracks.clean(raw_track, row, column) if raw_track else ""
+        name = names.clean(raw_name, row, header[place + 3]) if raw_name else ""
+        if track is not None and name is not None:
+            found.append(Slot(place, header[place + 3], track, name))
+    return tuple(found)
 
 
 def _slots(header: Sequence[str], faults: Faults) -> list[str]:

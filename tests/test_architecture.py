@@ -27,6 +27,7 @@ FLOORS = [
         "pipeline.config",
         "pipeline.data.coool_pickle",
         "pipeline.data.encode",
+        "pipeline.data.hazard_tracks",
         "pipeline.data.keyboxes",
         "pipeline.data.unpickle",
         "pipeline.data.watermark_find",
@@ -67,6 +68,7 @@ FLOORS = [
     [
         "pipeline.clip",
         "pipeline.data.cut",
+        "pipeline.data.ego_motion",
         "pipeline.data.frames",
         "pipeline.data.overlay",
         "pipeline.embedded_language",
@@ -76,6 +78,7 @@ FLOORS = [
         "pipeline.stages",
     ],
     [
+        "pipeline.data.driver_reaction",
         "pipeline.data.rebuild",
         "pipeline.desk",
         "pipeline.models",
@@ -141,6 +144,7 @@ FLOORS = [
         "sitegen.card",
         "sitegen.compare",
         "sitegen.coool",
+        "sitegen.coool_write",
         "sitegen.copies",
         "sitegen.data_check_clips",
         "sitegen.data_check_leaks",
@@ -154,13 +158,16 @@ FLOORS = [
     ],
     [
         "sitegen.contexts",
+        "sitegen.coool_results",
         "sitegen.data_check",
+        "sitegen.driver_states",
         "sitegen.paired",
         "sitegen.probes",
         "sitegen.readers",
         "sitegen.rewrite",
     ],
     [
+        "sitegen.coool_score",
         "sitegen.data_check_run",
         "sitegen.fixes",
         "sitegen.gathered",
@@ -237,11 +244,13 @@ FLOORS = [
         "sitegen.cli_data_check",
         "sitegen.cli_data_frames",
         "sitegen.cli_data_split",
-        "sitegen.cli_files",
+        "sitegen.cli_score_coool",
         "sitegen.intake_app",
     ],
     [
         "sitegen.cli_data_rebuild",
+        "sitegen.cli_export",
+        "sitegen.cli_files",
         "sitegen.intake_server",
     ],
     [

@@ -19,6 +19,7 @@ from pipeline.records import (
     Match,
     Parse,
     Prediction,
+    Reaction,
     Reply,
     Snippet,
     Stage,
@@ -63,6 +64,7 @@ RECORDS: dict[str, list[Any]] = {
         Match("v1", 3, "2", "dog", 0.25, True, False),
         Match("v1", 3, "2", "cat", -0.5, False, True),
     ],
+    "reactions": [Reaction("v2", None, 0.0), Reaction("v1", 31, 0.75, (0.5, 0.25, 0.125))],
     "outcomes": [
         VideoOutcome("v2", "v2.mp4", 0, 0.0, 0, 0, "broken"),
         VideoOutcome("v1", "v1.mp4", 300, 29.97, 1280, 720, "", "odd"),
