@@ -5,12 +5,12 @@ from pathlib import Path
 
 from sitegen import charts
 from sitegen.board_files import board_files
-from sitegen.build import environment, find_templates
 from sitegen.contexts import Shell
 from sitegen.gathered import SiteData
 from sitegen.ledger import Entry
 from sitegen.page_board import leaderboard_page
 from sitegen.probes import Probe
+from sitegen.rendering import environment, find_templates
 from tests.compare_case import board
 
 SHELL = Shell("Generated", "Systems on videos.", "", "leaderboard", "Generated", "0")

@@ -9,12 +9,12 @@ from playwright.sync_api import BrowserContext, Page
 from pipeline.config import BenchmarkSettings
 from pipeline.records import Prediction, TruthHazard
 from pipeline.scores import Submission
-from sitegen.build import environment, find_templates
 from sitegen.compare_files import compare_files
 from sitegen.contexts import Shell
 from sitegen.evaluate import evaluate, truth_sha256
 from sitegen.gathered import SiteData, System, VideoMedia, path_names
 from sitegen.page_compare import compare_page
+from sitegen.rendering import environment, find_templates
 from sitegen.uncertainty import uncertainties
 from tests.site_fixtures import EVIL, WordEmbedder
 

@@ -8,12 +8,12 @@ import numpy as np
 from pipeline.config import BenchmarkSettings
 from pipeline.records import Box, Kind, Prediction, TrackBox, TruthHazard
 from pipeline.scores import Evaluation, Scorecard, Submission
-from sitegen.build import environment, find_templates
 from sitegen.contexts import Shell
 from sitegen.failure_files import failure_files
 from sitegen.failures import Blame, Failure, FailureKind, FunnelStep
 from sitegen.gathered import SiteData, System, VideoMedia, path_names
 from sitegen.page_failures import failures_page
+from sitegen.rendering import environment, find_templates
 from sitegen.uncertainty import Interval, Uncertainty
 from tests.site_fixtures import EVIL
 from tests.test_uncertainty import SIGNATURE

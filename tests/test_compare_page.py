@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 
 from pipeline.records import Prediction
-from sitegen.build import environment
 from sitegen.compare import compare
 from sitegen.compare_files import SCALE, SHARD_BYTES, compare_files
 from sitegen.gathered import SiteData
 from sitegen.page_compare import ComparePage, compare_page, p_text, signed
 from sitegen.paired import all_pairs
+from sitegen.rendering import environment
 from sitegen.uncertainty import Interval
 from tests.compare_case import ODD_ID, SHELL, board
 

@@ -18,9 +18,9 @@ from pipeline.records import (
     StageOutput,
     TrackBox,
 )
-from sitegen.build import environment
 from sitegen.figure2 import MAX_COLUMNS, MAX_GROUP_TRACKS, MAX_ROWS, Figure2, Picture, Place, figure2
 from sitegen.gathered import CropPicture, KeyframePicture, VideoMedia
+from sitegen.rendering import environment
 from sitegen.thumbnails import snippet_pictures
 
 EVIL = '</td><script>alert(1)</script>"\u202e{{ 7*7 }}' + "w" * 500

@@ -10,8 +10,8 @@ import pytest
 
 from pipeline.benchmark import open_benchmark
 from sitegen import intake_server
-from sitegen.build import find_templates
 from sitegen.intake_pages import upload_page
+from sitegen.rendering import find_templates
 from tests.intake_process import CSV, TOKEN, Answer, Server, multipart, running, small_benchmark
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="stops by signals")

@@ -11,7 +11,7 @@ from pipeline.benchmark import Benchmark
 from pipeline.config import BenchmarkSettings, read_benchmark_settings
 from pipeline.errors import ConfigError, Fault, FaultsError, InputError
 from sitegen import build, intake_pages
-from sitegen.build import build_site, find_locale
+from sitegen.build import build_site
 from sitegen.catalogues import languages, read_language, script_messages
 from sitegen.intake_records import Details, Report, Upload
 from sitegen.language import (
@@ -28,6 +28,7 @@ from sitegen.language import (
 )
 from sitegen.readers import FORMATS
 from sitegen.rehearsal import report
+from sitegen.rendering import find_locale
 from tests.catalogue import TEMPLATE, as_pot, extracted, files, messages_of
 from tests.language_case import MARKED, Unmarked, make_benchmark, make_board, unmarked, wide
 from tests.site_fixtures import Board, WordEmbedder

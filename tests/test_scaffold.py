@@ -15,9 +15,9 @@ from pipeline.config import BenchmarkSettings, DemoSubmission
 from pipeline.errors import InputError
 from pipeline.minilm import INSTALL
 from sitegen.about import Sender
-from sitegen.build import find_templates
 from sitegen.cli import app
 from sitegen.readers import read_truth
+from sitegen.rendering import find_templates
 from sitegen.scaffold import write_benchmark
 
 ROOT = Path(__file__).parent.parent

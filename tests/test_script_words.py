@@ -10,9 +10,9 @@ import pytest
 from babel.messages.extract import extract_from_file
 from playwright.sync_api import BrowserContext
 
-from sitegen.build import find_templates
 from sitegen.language import Language, speaking
 from sitegen.numerals import percent
+from sitegen.rendering import find_templates
 from tests.board_case import site_data, write_page
 
 ASSETS = find_templates() / "assets"

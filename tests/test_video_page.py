@@ -7,11 +7,11 @@ import pytest
 
 from pipeline.config import BenchmarkSettings
 from pipeline.records import Box, Kind, TrackBox, TruthHazard
-from sitegen.build import environment
 from sitegen.contexts import Shell
 from sitegen.failures import NAMES, SENTENCES, FailureKind
 from sitegen.gathered import KeyframePicture, SiteData, VideoMedia
 from sitegen.page_video import Place, video_page
+from sitegen.rendering import environment
 from sitegen.video_contexts import VideoPage
 from tests.video_case import NOT_RANKED, make_site
 

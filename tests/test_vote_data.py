@@ -9,10 +9,10 @@ import pytest
 from pipeline.config import BenchmarkSettings
 from pipeline.records import Prediction, TruthHazard
 from pipeline.scores import Evaluation, Scorecard, Signature, Submission
-from sitegen.build import environment
 from sitegen.contexts import Shell
 from sitegen.gathered import KeyframePicture, SiteData, System, VideoMedia
 from sitegen.page_vote import INDEX_FILE, SHARD_BYTES, candidates, vote_files, vote_page
+from sitegen.rendering import environment
 from sitegen.uncertainty import Interval, Uncertainty
 from tests.site_fixtures import EVIL
 

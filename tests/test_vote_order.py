@@ -5,7 +5,7 @@ import json
 import pytest
 from playwright.sync_api import Browser
 
-from sitegen.build import find_templates
+from sitegen.rendering import find_templates
 
 pytestmark = pytest.mark.browser
 
