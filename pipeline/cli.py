@@ -86,7 +86,10 @@ def predict(
         boxes = boxes or str(benchmark.boxes)
     settings = read_run_config(config) if config else RunConfig()
     if not Place(boxes).is_file():
-        raise InputError(f"{boxes}: no such file; expected the `boxes` table (--boxes).")
+        raise InputError(
+            f"{boxes}: no such file; expected the `boxes` table (--boxes). Without annotations, make one "
+            "from the clips: coooler data propose."
+        )
     if replay and not recording:
         raise InputError("--replay needs --recording; expected the folder of a recording.")
     clips, rows = find_videos(Place(videos)), BOXES.from_bytes(Place(boxes).read(), boxes)

@@ -78,7 +78,8 @@ def make_card(card: Card) -> str:
         "## Fields",
         _table(("field", "meaning"), [(f"`{name}`", meaning) for name, meaning in _FIELDS]),
         "Boxes, where there are any, are a Parquet table of `video_id`, `frame_index`, `track_id`, `kind` "
-        "(`challenge` for hazards, `traffic` for the rest) and `x1_px`, `y1_px`, `x2_px`, `y2_px`.",
+        "(`challenge` for hazards, `traffic` for the rest, `proposed` for what a program found and nobody "
+        "annotated) and `x1_px`, `y1_px`, `x2_px`, `y2_px`.",
         "## Splits",
         _splits(card),
         "## Annotations",

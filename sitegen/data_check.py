@@ -98,6 +98,14 @@ def _hazards(given: CheckInput) -> Iterator[Finding]:
             )
         if given.boxes is not None and row.track_id is not None:
             yield from _track(row, row.track_id, given.boxes.get(row.video_id))
+    if proposed := sorted(name for name, facts in (given.boxes or {}).items() if facts.proposed_tracks):
+        yield Finding(
+            Severity.NOTE,
+            "proposed boxes",
+            tuple(proposed),
+            f"The tracks of {len(proposed)} videos were proposed by a program; nobody annotated them.",
+            "Annotate them, or say so wherever results are shown.",
+        )
     told: dict[str, set[str | None]] = {name: set() for name in given.video_ids}
     for row in given.truth:
         told[row.video_id].add(row.track_id)

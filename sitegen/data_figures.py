@@ -45,6 +45,7 @@ class BoxFacts:
     hazard_tracks: frozenset[str]
     traffic_tracks: frozenset[str]
     frames_of: Mapping[str, tuple[int, int]]
+    proposed_tracks: frozenset[str] = frozenset()
 
 
 def box_facts(rows: Iterable[TrackBox]) -> dict[str, BoxFacts]:
@@ -66,6 +67,7 @@ def box_facts(rows: Iterable[TrackBox]) -> dict[str, BoxFacts]:
             frozenset(tracks[name][Kind.CHALLENGE]),
             frozenset(tracks[name][Kind.TRAFFIC]),
             spans[name],
+            frozenset(tracks[name][Kind.PROPOSED]),
         )
         for name, found in frames.items()
     }

@@ -87,7 +87,10 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Figure2:
-    """The whole figure; the texts in `left_out` say what was not drawn."""
+    """The whole figure; the texts in `left_out` say what was not drawn.
+
+    `proposed` are the tracks, as they are named here, that nobody annotated.
+    """
 
     summary: str
     low: str
@@ -96,6 +99,7 @@ class Figure2:
     tracks: tuple[TrackRows, ...]
     groups: tuple[Group, ...]
     left_out: tuple[str, ...]
+    proposed: tuple[str, ...] = ()
 
 
 def figure2(
@@ -112,7 +116,9 @@ def figure2(
     """
     if not matches:
         return None
-    hazards = {s.track_box.track_id for s in snippets if s.track_box.kind is Kind.CHALLENGE}
+    kinds = {(s.track_box.track_id, s.track_box.kind) for s in snippets}
+    hazards = {track for track, kind in kinds if kind is Kind.CHALLENGE}
+    proposed = {track for track, kind in kinds if kind is Kind.PROPOSED} - hazards
     rows: dict[Place, dict[str, Match]] = {}
     for match in matches:
         rows.setdefault((match.track_id, match.frame_index), {})[match.label] = match
@@ -168,6 +174,7 @@ def figure2(
         tuple(tracks),
         groups,
         tuple(text for text in left_out if text),
+        tuple(sorted(shorten(visible(track), 24) for track in proposed)),
     )
 
 
@@ -246,6 +253,6 @@ def _frames(frames: Sequence[int]) -> str:
 
 
 def _natural(track: str) -> tuple[bool, int, str]:
-    """Sorts "9" before "10", numbers before words."""
-    numeric = track.isdecimal()
+    """Sorts "9" before "10" and "p9" before "p10", numbers before words."""
+    numeric = track.removeprefix("p").isdecimal()
     return (not numeric, len(track) if numeric else 0, track)

@@ -15,7 +15,7 @@ from pipeline.records import (
     UsageRow,
     VideoOutcome,
 )
-from pipeline.table import Table
+from pipeline.table import Table, metadata
 from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES, USAGE
 from sitegen import ledger
 from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names
@@ -124,6 +124,7 @@ def gather(
         ledger_file,
         load_votes(benchmark, {one.stored.slug: one.stored.predictions_sha256 for one in board}),
         restored=read_restorations(benchmark.videos),
+        proposed_by=metadata(benchmark.boxes).get("proposed_by", "") if boxes else "",
     )
 
 

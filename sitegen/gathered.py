@@ -167,7 +167,8 @@ class SiteData:
     `boxes` holds the boxes on the keyframes only; `names` maps a video id to its path part;
     `ledger_file` is the ledger as it lies on disk, `votes` are people's on pairs of captions;
     `check` is what the last `coooler data check` found, None when it was not kept or is hidden;
-    `restored` is what was done to the clips before they came here. With
+    `restored` is what was done to the clips before they came here; `proposed_by` names what proposed
+    the boxes that nobody annotated, as "motion" or "detector,motion". With
     `hidden` nothing here tells of the truth: every video has no rows, and no system has scores of
     pairs or single videos.
     """
@@ -184,6 +185,7 @@ class SiteData:
     votes: Votes = field(default_factory=Votes)
     check: StoredCheck | None = None
     restored: Restorations = field(default_factory=Restorations)
+    proposed_by: str = ""
 
     @property
     def hidden(self) -> bool:

@@ -30,6 +30,7 @@ def of_video(data: SiteData, video_id: str) -> SiteData:
         {video_id: data.names[video_id]},
         tuple(_system(system, video_id) for system in data.systems),
         restored=Restorations((restored,) if restored else ()),
+        proposed_by=data.proposed_by,
     )
 
 

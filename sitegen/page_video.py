@@ -27,7 +27,7 @@ from sitegen.video_contexts import (
     TruthView,
     VideoPage,
 )
-from sitegen.video_film import chips, film, label_px, named_track, track_labels, tracks_text
+from sitegen.video_film import chips, film, label_px, named_track, proposer, track_labels, tracks_text
 from sitegen.words import difference, shorten, visible
 
 
@@ -74,7 +74,7 @@ def video_page(
         clip=media.clip,
         restored=restored_href(data, video_id),
         tracks=tracks if any(frame.boxes for frame in frames) else (),
-        tracks_text=tracks_text(tracks),
+        tracks_text=tracks_text(tracks, data.proposed_by),
         crops=_crops(data, video_id, media, labels),
         systems=tuple(_system_view(data, system, video_id, hazards, transcripts) for system in data.systems),
         matrix_columns=truth_views,
@@ -87,7 +87,18 @@ def video_page(
         previous=place.before,
         following=place.after,
         place=place.text,
+        proposed=_proposed(boxes, data.proposed_by),
     )
+
+
+def _proposed(boxes: Sequence[TrackBox], proposed_by: str) -> str:
+    """That tracks are proposals, as two sentences; empty where all are annotated."""
+    if all(box.kind is not Kind.PROPOSED for box in boxes):
+        return ""
+    return _(
+        "The tracks are proposals, found by {proposer}: nobody annotated them. "
+        "Some are of nothing, and some things on the road have none."
+    ).format(proposer=proposer(proposed_by))
 
 
 def _facts(data: SiteData, media: VideoMedia, boxes: Sequence[TrackBox]) -> tuple[Fact, ...]:
@@ -104,7 +115,7 @@ def _facts(data: SiteData, media: VideoMedia, boxes: Sequence[TrackBox]) -> tupl
         ]
     facts.append(Fact(_("Keyframes"), str(len(media.frames))))
     if not data.hidden:
-        facts.append(Fact(_("Tracks on them"), tracks_text(chips(boxes, {}))))
+        facts.append(Fact(_("Tracks on them"), tracks_text(chips(boxes, {}), data.proposed_by)))
     return tuple(facts)
 
 
@@ -142,6 +153,8 @@ def _crops(
         if not hazard and crop.track_id not in blamed:
             continue
         alt = _("Traffic track {track}, cut from frame {n}")
+        if crop.kind is Kind.PROPOSED:
+            alt = _("Proposed track {track}, cut from frame {n}")
         if hazard:
             alt = _("Hazard track {track}, cut from frame {n}")
         first = crop.track_id not in shown
@@ -158,6 +171,7 @@ def _crops(
                 crop.frame_index,
                 f"{crop.width_px} × {crop.height_px} px",
                 tuple(seen.get(crop.track_id, ())) if first else (),
+                crop.kind is Kind.PROPOSED,
             )
         )
     return tuple(sorted(views, key=lambda view: not view.hazard))

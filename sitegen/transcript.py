@@ -55,7 +55,8 @@ def transcript(
         for stage in STAGES
         if any(output.stage is stage for output in records.stages)
     )
-    tracks = _tracks(records.snippets, records.matches, hazards)
+    proposed = {s.track_box.track_id for s in records.snippets if s.track_box.kind is Kind.PROPOSED}
+    tracks = _tracks(records.snippets, records.matches, hazards, proposed)
     counted = sum(snippet.excluded is None for snippet in records.snippets)
     summary = _("{calls} in {stages}").format(
         calls=_calls(len(records.stages)), stages=plural(len(stages), "{n} stage", "{n} stages")
@@ -114,7 +115,7 @@ def _saying(run: Sequence[StageOutput]) -> Saying:
 
 
 def _tracks(
-    snippets: Iterable[Snippet], matches: Iterable[Match], hazards: set[str]
+    snippets: Iterable[Snippet], matches: Iterable[Match], hazards: set[str], proposed: set[str]
 ) -> tuple[TrackCheck, ...]:
     by_track: dict[str, list[Snippet]] = {}
     for snippet in snippets:
@@ -123,10 +124,15 @@ def _tracks(
     for match in matches:
         found.setdefault(match.track_id, []).append(match)
     order = sorted(by_track, key=lambda track: (track not in hazards, track not in found, track))
-    return tuple(_track(track, by_track[track], found.get(track, []), track in hazards) for track in order)
+    return tuple(
+        _track(track, by_track[track], found.get(track, []), track in hazards, track in proposed)
+        for track in order
+    )
 
 
-def _track(track: str, snippets: Sequence[Snippet], matches: Sequence[Match], hazard: bool) -> TrackCheck:
+def _track(
+    track: str, snippets: Sequence[Snippet], matches: Sequence[Match], hazard: bool, proposed: bool
+) -> TrackCheck:
     reasons = Counter(snippet.excluded for snippet in snippets if snippet.excluded is not None)
     counted = len(snippets) - reasons.total()
     best = max(matches, key=lambda match: (match.cosine, match.label), default=None)
@@ -141,6 +147,7 @@ def _track(track: str, snippets: Sequence[Snippet], matches: Sequence[Match], ha
         score(best.cosine, digits=3) if best else None,
         ", ".join(f"{shorten(visible(n), 40)} ×{c}" for n, c in detected.most_common(_MAX_LABELS)),
         ", ".join(shorten(visible(label), 60) for label in anomalous),
+        proposed and not hazard,
     )
 
 

@@ -23,6 +23,7 @@ class OverlayBox:
     track: str
     label: str
     hazard: bool
+    proposed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,7 @@ class TrackChip:
     label: str
     title: str
     hazard: bool
+    proposed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,7 @@ class CropView:
     frame: int
     size: str
     seen_as: tuple[str, ...]
+    proposed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +191,7 @@ class TrackCheck:
     best: Score | None
     detected: str
     in_aos: str
+    proposed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +210,7 @@ class Transcript:
 
 @dataclass(frozen=True, slots=True)
 class VideoPage:
-    """videos/<name>.html"""
+    """videos/<name>.html; `proposed` says that nobody annotated the tracks, empty where somebody did."""
 
     shell: Shell
     video_id: str
@@ -236,3 +240,4 @@ class VideoPage:
     previous: Link | None
     following: Link | None
     place: str
+    proposed: str = ""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from pipeline.records import Kind, TrackBox, TruthHazard
 from sitegen.gathered import KeyframePicture, VideoMedia
+from sitegen.language import N_
 from sitegen.language import gettext as _
 from sitegen.numerals import number, plural, seconds
 from sitegen.video_contexts import FilmFrame, OverlayBox, TrackChip
@@ -39,7 +40,9 @@ def _film_frame(
     ordered = sorted(boxes, key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id))
     seen = dict.fromkeys(box.track_id for box in ordered if box.kind is Kind.CHALLENGE)
     parts = [_("hazard track {track}").format(track=named_track(track, labels)) for track in seen]
-    others = sum(box.kind is not Kind.CHALLENGE for box in ordered)
+    proposed = sum(box.kind is Kind.PROPOSED for box in ordered)
+    parts += [plural(proposed, "{n} proposed box", "{n} proposed boxes")] if proposed else []
+    others = sum(box.kind is Kind.TRAFFIC for box in ordered)
     parts += [plural(others, "{n} traffic box", "{n} traffic boxes")] if others else []
     return FilmFrame(
         place + 1,
@@ -71,22 +74,47 @@ def named_track(track: str, labels: Mapping[str, str]) -> str:
 def chips(boxes: Sequence[TrackBox], labels: Mapping[str, str]) -> tuple[TrackChip, ...]:
     """The tracks of these boxes, hazards first; a track with boxes of both kinds is a hazard."""
     hazards = {box.track_id for box in boxes if box.kind is Kind.CHALLENGE}
+    proposed = {box.track_id for box in boxes if box.kind is Kind.PROPOSED} - hazards
     order = sorted({box.track_id for box in boxes}, key=lambda track: (track not in hazards, _by_size(track)))
     return tuple(
-        TrackChip(visible(track), shorten(visible(track), 16), labels.get(track, ""), track in hazards)
+        TrackChip(
+            visible(track),
+            shorten(visible(track), 16),
+            labels.get(track, ""),
+            track in hazards,
+            track in proposed,
+        )
         for track in order
     )
 
 
 def _by_size(track: str) -> tuple[int, str]:
-    """Sorts 9 before 10."""
-    return (len(track), track) if track.isdecimal() else (0, track)
+    """Sorts 9 before 10, and p9 before p10."""
+    return (len(track), track) if track.removeprefix("p").isdecimal() else (0, track)
 
 
-def tracks_text(tracks: Sequence[TrackChip]) -> str:
-    """How many tracks there are, by kind."""
-    hazards = sum(track.hazard for track in tracks)
-    return _("{hazards} hazard, {others} traffic").format(hazards=hazards, others=len(tracks) - hazards)
+PROPOSERS = {
+    "motion": N_("motion"),
+    "detector": N_("a detector"),
+    "detector,motion": N_("a detector and motion"),
+}
+"""What proposed tracks, in words, by the mark `proposed_by` of a `boxes` table."""
+
+
+def proposer(proposed_by: str) -> str:
+    """What proposed the tracks of a benchmark, in words."""
+    return _(PROPOSERS.get(proposed_by, N_("a program")))
+
+
+def tracks_text(tracks: Sequence[TrackChip], proposed_by: str = "") -> str:
+    """How many tracks there are, by kind; `proposed_by` is the mark of the `boxes` table."""
+    hazards, proposed = sum(track.hazard for track in tracks), sum(track.proposed for track in tracks)
+    if proposed and proposed == len(tracks):
+        text = _("{n} proposed by {proposer}, not annotated")
+        return text.format(n=proposed, proposer=proposer(proposed_by))
+    others = len(tracks) - hazards - proposed
+    text = _("{hazards} hazard, {others} traffic").format(hazards=hazards, others=others)
+    return _("{tracks}, {n} proposed").format(tracks=text, n=proposed) if proposed else text
 
 
 def _when(index: int, time: str) -> str:
@@ -107,6 +135,7 @@ def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:
         visible(box.track_id),
         shorten(visible(box.track_id), 16),
         box.kind is Kind.CHALLENGE,
+        box.kind is Kind.PROPOSED,
     )
 
 
