@@ -2,6 +2,7 @@
 
 import typer
 
+from sitegen.cli_data_annotate import agreement, annotate
 from sitegen.cli_data_check import check
 from sitegen.cli_data_frames import frames, overlay
 from sitegen.cli_data_import import import_coool
@@ -12,5 +13,17 @@ from sitegen.cli_data_split import card, split
 data = typer.Typer(help="Tools for the data of a benchmark.", rich_markup_mode=None)
 
 data.command("import-coool")(import_coool)
-for command in (cut, boxes, propose, frames, overlay, check, split, card, rebuild):
+for command in (
+    cut,
+    boxes,
+    propose,
+    annotate,
+    agreement,
+    frames,
+    overlay,
+    check,
+    split,
+    card,
+    rebuild,
+):
     data.command()(command)

@@ -12,7 +12,7 @@ from pipeline.files import sha256_of
 from sitegen.restoration import ENDING, FOLDER
 from tests.site_fixtures import EVIL, make_benchmark
 
-TELEA = "Telea inpainting (OpenCV)"
+TELEA = "un-blending by temporal statistics, Telea inpainting where opaque"
 PLAIN = "non-local means (OpenCV)"
 
 

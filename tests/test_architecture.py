@@ -102,6 +102,7 @@ FLOORS = [
     ],
     [
         "sitegen.__init__",
+        "sitegen.agreement",
         "sitegen.blocks",
         "sitegen.intake_limits",
         "sitegen.language",
@@ -122,6 +123,7 @@ FLOORS = [
     ],
     [
         "sitegen.about",
+        "sitegen.annotate_records",
         "sitegen.board_history",
         "sitegen.captions",
         "sitegen.figure2",
@@ -136,6 +138,9 @@ FLOORS = [
         "sitegen.split",
     ],
     [
+        "sitegen.annotate_answers",
+        "sitegen.annotate_journal",
+        "sitegen.annotate_truth",
         "sitegen.data_findings",
         "sitegen.evaluate",
         "sitegen.intake_form",
@@ -145,6 +150,7 @@ FLOORS = [
         "sitegen.unpack",
     ],
     [
+        "sitegen.annotate_desk",
         "sitegen.card",
         "sitegen.compare",
         "sitegen.coool",
@@ -199,6 +205,7 @@ FLOORS = [
         "sitegen.video_film",
     ],
     [
+        "sitegen.annotate_clips",
         "sitegen.blame",
         "sitegen.compare_files",
         "sitegen.exports",
@@ -229,15 +236,18 @@ FLOORS = [
         "sitegen.rendering",
     ],
     [
+        "sitegen.annotate_pages",
         "sitegen.build",
         "sitegen.intake_pages",
         "sitegen.scaffold",
         "sitegen.strict",
     ],
     [
+        "sitegen.annotate_app",
         "sitegen.board",
     ],
     [
+        "sitegen.annotate_server",
         "sitegen.cli_common",
         "sitegen.demo",
         "sitegen.intake_worker",
@@ -245,6 +255,7 @@ FLOORS = [
     ],
     [
         "sitegen.cli_board",
+        "sitegen.cli_data_annotate",
         "sitegen.cli_data_check",
         "sitegen.cli_data_frames",
         "sitegen.cli_data_split",

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.data.restored_pictures import before_after
-from pipeline.data.watermark import eraser, mask_from_boxes, mask_png, remove, sample_for_watermark
+from pipeline.data.watermark import eraser, mask_from_boxes, mask_png
 from pipeline.data.watermark_find import (
     MIN_SAMPLES,
     NOTHING,
@@ -21,7 +21,6 @@ from pipeline.data.watermark_find import (
 from pipeline.errors import FaultsError, InputError
 from pipeline.records import RgbImage
 from pipeline.video import read_keyframes
-from tests.clips import write_clip
 from tests.overlays import OVERLAYS, Overlay, drawn_on, laid_over
 
 DEMO = Path(__file__).parent.parent / "demo" / "videos"
@@ -152,8 +151,8 @@ def test_what_is_not_masked_stays(seed: int) -> None:
     random = np.random.default_rng(seed)
     rgb = random.integers(0, 256, (24, 32, 3), np.uint8)
     mask = random.random((24, 32)) < random.random() * 0.4
-    for made in (remove(rgb, mask), eraser([rgb, 255 - rgb], mask)(rgb)):
-        assert np.array_equal(made[~mask], rgb[~mask])
+    made = eraser([rgb, 255 - rgb], mask)(rgb)
+    assert np.array_equal(made[~mask], rgb[~mask])
 
 
 def test_a_half_transparent_logo_gives_the_scene_back() -> None:
@@ -181,15 +180,9 @@ def test_digits_that_change_are_filled_not_undone() -> None:
 
 def test_sizes_that_differ_are_told() -> None:
     rgb, mask = np.zeros((10, 20, 3), np.uint8), np.zeros((20, 10), np.bool_)
-    for act in (lambda: remove(rgb, mask), lambda: eraser([rgb], mask), lambda: eraser([], mask)):
+    for act in (lambda: eraser([rgb], mask), lambda: eraser([], mask)):
         with pytest.raises(InputError):
             act()
-
-
-def test_samples_come_from_the_whole_clip(tmp_path: Path) -> None:
-    path = write_clip(tmp_path / "a.mp4", 64)
-    samples = sample_for_watermark(path)
-    assert samples.shape == (60, 48, 64, 3) and samples[0].mean() < samples[30].mean() < samples[59].mean()
 
 
 def test_the_mask_and_the_pictures_as_files() -> None:

@@ -2,25 +2,18 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.data.watermark_find import SAMPLES, Floats, Mask, PixelBox
+from pipeline.data.watermark_find import Floats, Mask, PixelBox
 from pipeline.errors import Fault, FaultsError, InputError
 from pipeline.records import RgbImage
-from pipeline.video import read_keyframes
 
 RADIUS_PX = 3  # how far around a pixel to be filled inpainting looks
 MAX_OPACITY = 0.75  # above, too little of the scene shows to give it back
 SLACK = 0.12  # of opacity: how wrong the spread may be
-
-
-def sample_for_watermark(path: Path) -> NDArray[np.uint8]:
-    """Frames (N, H, W, 3) at equal distance over a clip, at most 60. Raises VideoError."""
-    return np.stack([frame.rgb for frame in read_keyframes(path, path.stem, SAMPLES).frames])
 
 
 def mask_from_boxes(boxes: Sequence[PixelBox], height: int, width: int) -> Mask:
@@ -121,19 +114,6 @@ def _parts(mask: Mask) -> Iterator[tuple[int, int, Mask]]:
     count, _, stats, _ = cv2.connectedComponentsWithStats(wide)
     for x, y, width, height in stats[1:count, :4].tolist():
         yield y, x, mask[y : y + height, x : x + width]
-
-
-def remove(rgb: RgbImage, mask: Mask) -> RgbImage:
-    """The picture (H, W, 3) with the masked pixels (H, W) filled from what surrounds them (Telea 2004).
-
-    Pixels outside the mask stay as they are. Raises InputError when the sizes differ.
-    """
-    _require_size(rgb, mask.shape)
-    filled = rgb.copy()
-    for top, left, part in _parts(mask):  # a cut-out gives the same and takes far less time
-        at = slice(top, top + part.shape[0]), slice(left, left + part.shape[1])
-        filled[at] = np.where(part[..., None], _inpainted(rgb[at], part), filled[at])
-    return filled
 
 
 def _inpainted(rgb: RgbImage, holes: Mask) -> RgbImage:
