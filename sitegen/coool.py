@@ -116,14 +116,14 @@ def frame_rows(data: bytes, faults: Faults) -> Iterator[FrameRow]:
         for row, cells in enumerate(rows, start=1):
             limit_rows(row, faults)
             place = _frame(cells[0], row, places, faults)
-            if len(cells) > len(header) and "".join(cells[len(header) :]).strip():
+            shifted = bool("".join(cells[len(header) :]).strip())
+            if shifted:
                 faults.add(
                     row, None, f"{len(cells)} cells", f"at most {len(header)}, as in the header", _QUOTE
                 )
-                continue
             if place is None:
                 continue
-            slots = cells[2 : len(header)]
+            slots = [] if shifted else cells[2 : len(header)]
             filled = _filled(slots, header, row, tracks, names) if "".join(slots).strip() else ()
             yield FrameRow(row, *place, cells[1].strip() if len(cells) > 1 else "", filled)
 

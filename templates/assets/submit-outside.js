@@ -103,11 +103,11 @@
         return;
       }
       const name = check.strip(slots[slot + 1]);
+      const cleanTrack = track ? this.tracks.clean(track, this.row, this.header[slot + 2]) : "";
       if (!name) {
-        this.untold += track ? 1 : 0;
+        this.untold += cleanTrack ? 1 : 0;
         return;
       }
-      const cleanTrack = track ? this.tracks.clean(track, this.row, this.header[slot + 2]) : "";
       const cleanName = this.names.clean(name, this.row, column);
       if (cleanTrack === null || cleanName === null) return;
       if (!this.videos.has(video)) this.videos.set(video, new Map());
@@ -166,7 +166,7 @@
         rows.set(video, first);
       }
       const places = counted(this.untold, "track in a frame has", "tracks in frames have");
-      const warnings = this.untold ? [places + " no caption and count as no prediction."] : [];
+      const warnings = this.untold ? [places + " no caption and thus no prediction."] : [];
       return { column: "ID", rows, predictions, warnings };
     }
   }
