@@ -117,6 +117,8 @@ def _coool() -> Iterator[Case]:
         two + "1_0,F,7,cat\n2_0,F,7,cat\n",
         two + "7_0,F,7,cat\n",
         two + f"v1_0,F,{'t' * 129},{'x' * 2001}\nv1_1,F,\u200b,\u200b\n",
+        two + "v1_0,F,7,,8,cat\nv1_1,F,7,,,\n",
+        two + f"v1_0,F,{'t' * 129},,8,cat\n",
         two + 'v1_0,F,7,"cat\nv1_1,F,8,dog\n',
         two + 'v1_0,F,7,"cat"x\n',
         two.replace("Name_2", "Name_3") + "v1_0,F,7,cat\n",
