@@ -8,6 +8,7 @@ from sitegen.cli_data_frames import frames, overlay
 from sitegen.cli_data_import import import_coool
 from sitegen.cli_data_propose import propose
 from sitegen.cli_data_rebuild import boxes, cut, rebuild
+from sitegen.cli_data_restore import restore
 from sitegen.cli_data_split import card, split
 
 data = typer.Typer(help="Tools for the data of a benchmark.", rich_markup_mode=None)
@@ -16,6 +17,7 @@ data.command("import-coool")(import_coool)
 for command in (
     cut,
     boxes,
+    restore,
     propose,
     annotate,
     agreement,
