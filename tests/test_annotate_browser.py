@@ -16,7 +16,7 @@ from tests.annotating import Serving, make_folder, serving
 
 pytestmark = pytest.mark.browser
 
-READY = "() => document.getElementById('editor').dataset.ready"
+READY = "() => document.getElementById('editor')?.dataset.ready"
 SENTENCE = "A van pulls out in front of us"
 
 
