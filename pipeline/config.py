@@ -5,6 +5,7 @@ Unknown keys, wrong types and values out of range are errors, all of them report
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -206,9 +207,10 @@ class BenchmarkSettings(Settings):
     demo: tuple[DemoSubmission, ...] = ()
 
 
-def _read_toml(path: Path, model: type[M]) -> M:
+def read_toml(path: Path, model: type[M], parse_float: Callable[[str], Any] = float) -> M:
+    """The settings in a TOML file. Raises ConfigError with every fault."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=parse_float)
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: no such file; expected a TOML file with the settings.") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -225,9 +227,9 @@ def _read_toml(path: Path, model: type[M]) -> M:
 
 def read_run_config(path: Path) -> RunConfig:
     """The run configuration in a TOML file. Raises ConfigError with every fault."""
-    return _read_toml(path, RunConfig)
+    return read_toml(path, RunConfig)
 
 
 def read_benchmark_settings(path: Path) -> BenchmarkSettings:
     """The benchmark settings in a `coooler.toml`. Raises ConfigError with every fault."""
-    return _read_toml(path, BenchmarkSettings)
+    return read_toml(path, BenchmarkSettings)

@@ -46,7 +46,8 @@ def frame_indices(total: int, count: int = 25) -> tuple[int, ...]:
     return tuple(round(i * total / count) for i in range(count))
 
 
-def _open(path: Path) -> InputContainer:
+def open_clip(path: Path) -> InputContainer:
+    """A local file, open for decoding. Raises VideoError when it is none that holds video."""
     if not path.is_file():
         raise VideoError(f"{path}: no such file; expected a video.")
     if path.stat().st_size == 0:
@@ -121,7 +122,7 @@ class _Reader:
 
 
 def _read_index(path: Path) -> _Index:
-    with _open(path) as container:
+    with open_clip(path) as container:
         stream = container.streams.video[0]
         rate = stream.average_rate or stream.guessed_rate
         times = [packet.pts for packet in container.demux(stream) if packet.size]
@@ -136,7 +137,7 @@ def _decode_wanted(path: Path, index: _Index, wanted: Collection[int]) -> _Decod
     Frames that no other frame refers to are skipped by the decoder unless they are wanted.
     """
     reader = _Reader(path, wanted)
-    with _open(path) as container:
+    with open_clip(path) as container:
         stream = container.streams.video[0]
         context = stream.codec_context
         context.thread_count = 1
@@ -159,7 +160,7 @@ def _decode_all(path: Path, wanted: Collection[int]) -> _Decoded:
     """Decode everything there is, past damaged places, and count the frames as they come."""
     reader = _Reader(path, wanted)
     total = broken = 0
-    with _open(path) as container:
+    with open_clip(path) as container:
         stream = container.streams.video[0]
         # One decoder thread: clips run in parallel, and the frames are the same anyway.
         stream.codec_context.thread_count = 1
@@ -223,7 +224,7 @@ def probe(path: Path, video_id: str) -> Video:
     """
     try:
         index = _read_index(path)
-        with _open(path) as container:
+        with open_clip(path) as container:
             container.streams.video[0].codec_context.thread_count = 1
             reader = _Reader(path, {0})
             for frame in container.decode(video=0):

@@ -18,7 +18,7 @@ from time import monotonic, sleep
 from typing import Any, TypeAlias
 
 from pipeline.benchmark import open_benchmark
-from sitegen import intake_server
+from sitegen import asgi, intake_server
 from sitegen.about import Sender
 from sitegen.intake import Intake
 from sitegen.intake_limits import ServerLimits
@@ -40,7 +40,7 @@ def main(folder: Path, mode: str) -> None:
     site = folder / "site"
     limits = ServerLimits(per_minute=6_000, burst=1_000)
     if mode == "strict":
-        intake_server._HEAD_SECONDS = 1.5
+        asgi._HEAD_SECONDS = 1.5
         limits = ServerLimits(
             max_bytes=10_000, per_minute=1, burst=3, token=TOKEN, trust_proxy=True, idle_seconds=1.5
         )

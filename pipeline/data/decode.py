@@ -15,10 +15,7 @@ from av.video.reformatter import VideoReformatter
 from pipeline.data.encode import Colour
 from pipeline.errors import VideoError
 from pipeline.records import RgbImage
-from pipeline.video import MAX_SIDE_PX
-
-# A clip is a local file: a playlist disguised as one must not make FFmpeg open anything else.
-_LOCAL_ONLY = {"protocol_whitelist": "file"}
+from pipeline.video import MAX_SIDE_PX, open_clip
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,23 +37,6 @@ class ClipHeader:
     def seconds(self) -> list[Fraction]:
         """The presentation times in seconds, as they stand in the file."""
         return [time * self.time_base_s for time in self.times]
-
-
-def open_clip(path: Path) -> InputContainer:
-    """A local file, open for decoding. Raises VideoError when it is none that holds video."""
-    if not path.is_file():
-        raise VideoError(f"{path}: no such file; expected a video.")
-    try:
-        container = av.open(f"file:{path.resolve()}", options=_LOCAL_ONLY)
-    except (FFmpegError, ValueError, OSError) as error:
-        raise VideoError(
-            f"{path}: not readable as a video ({error.__class__.__name__}); expected a file that FFmpeg "
-            "reads. It may be broken or not a video: copy it again or convert it."
-        ) from error
-    if not container.streams.video:
-        container.close()
-        raise VideoError(f"{path}: found no video stream; expected one. Is it a sound file?")
-    return container
 
 
 def read_header(path: Path) -> ClipHeader:

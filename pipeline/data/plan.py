@@ -1,6 +1,5 @@
 """The plan of a benchmark's clips: which part of which raw video each is, and where the boxes come from."""
 
-import tomllib
 from collections import Counter
 from decimal import Decimal
 from fractions import Fraction
@@ -8,10 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from pipeline.config import Settings
-from pipeline.errors import ConfigError, InputError
+from pipeline.config import Settings, read_toml
+from pipeline.errors import InputError
 from pipeline.files import sha256_file
 
 FILE_NAME = "plan.toml"
@@ -97,22 +96,7 @@ class Plan(Settings):
 
 def read_plan(path: Path) -> Plan:
     """The plan in a TOML file. Raises ConfigError with every fault."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
-    except FileNotFoundError as error:
-        raise ConfigError(
-            f"{path}: no such file; expected a TOML file with the plan of the clips."
-        ) from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"{path}: not readable as TOML: {error}") from error
-    try:
-        return Plan.model_validate(data)
-    except ValidationError as error:
-        lines = [f"{path}: {error.error_count()} wrong setting(s)."]
-        for fault in error.errors(include_url=False):
-            key = ".".join(str(part) for part in fault["loc"])
-            lines.append(f"  {key}: found {fault['input']!r}; {fault['msg']}" if key else f"  {fault['msg']}")
-        raise ConfigError("\n".join(lines)) from error
+    return read_toml(path, Plan, Decimal)
 
 
 def find_sources(plan: Plan, folder: Path | None) -> dict[str, Path]:
