@@ -1,65 +1,115 @@
-"""`python -m bench`: every measurement in one run, with ratios; also written to bench/report.md."""
+"""`python -m bench [NAME ...]`: the measurements with their ratios; all of them go to bench/report.md.
 
-import platform
+With names, only these are measured, and the report is left as it is.
+"""
+
 import sys
+import tempfile
+import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TypeAlias
 
-from bench import bootstrap, clip, embedding, executors, http_client, keyframes, site
+from bench import (
+    bootstrap,
+    clip,
+    coool_import,
+    embedding,
+    executors,
+    http_client,
+    keyframes,
+    media,
+    pages,
+    pipeline_cost,
+    processes,
+    reading,
+    rebuild,
+    scoring,
+    site,
+)
+from bench.machine import machine, versions
 from bench.timing import Measure
-from pipeline.benchmark import open_benchmark
+from pipeline.benchmark import Benchmark, open_benchmark
 from pipeline.files import write_text
 from sitegen.demo import run_demo
 
 HERE = Path(__file__).parent
+Job: TypeAlias = tuple[Callable[..., list[Measure]], tuple[object, ...]]
+NEED_SUBMISSIONS = {"pages", "site"}
+
+
+def jobs(benchmark: Benchmark, submitted: Benchmark) -> dict[str, Job]:
+    """What is measured, by name, with what it is given; `submitted` has submissions."""
+    return {
+        "keyframes": (keyframes.measure, (sorted(benchmark.videos.glob("*.mp4")),)),
+        "media": (media.measure, (benchmark,)),
+        "pipeline_cost": (pipeline_cost.measure, (benchmark,)),
+        "executors": (executors.measure, (benchmark,)),
+        "http_client": (http_client.measure, ()),
+        "clip": (clip.measure, ()),
+        "embedding": (embedding.measure, ()),
+        "scoring": (scoring.measure, ()),
+        "bootstrap": (bootstrap.measure, ()),
+        "reading": (reading.measure, ()),
+        "coool_import": (coool_import.measure, ()),
+        "pages": (pages.measure, (submitted,)),
+        "site": (site.measure, (submitted,)),
+        "rebuild": (rebuild.measure, ()),
+        "processes": (processes.measure, ()),
+    }
 
 
 def report(measures: list[Measure]) -> str:
-    """The measurements as a Markdown table."""
+    """The measurements as a Markdown table, under what they were measured on."""
     lines = [
         "# Measurements",
         "",
-        f"Python {platform.python_version()} on {platform.system()} {platform.machine()}; medians of",
-        "interleaved runs. Machines are noisy: the ratios count, the seconds do not.",
+        f"{machine()}. {versions()}.",
+        "",
+        "Made by `make bench`. Each row is of one run: medians of at least five rounds in which ours and its",
+        "floor or peer take turns, unless the note says otherwise. Machines are noisy: the ratios count, the",
+        "seconds do not.",
         "",
         "| what | ours | against | theirs | ratio | goal | note |",
         "|---|---:|---|---:|---:|---|---|",
     ]
     for one in measures:
         theirs = "" if one.peer_s is None else f"{one.peer_s:.4g} s"
-        ratio = "" if one.ratio is None else f"{one.ratio:.2f}"
+        ratio = "" if one.ratio is None else f"{one.ratio:.3g}"
         lines.append(
             f"| {one.what} | {one.ours_s:.4g} s | {one.peer} | {theirs} | {ratio} | {one.goal} | {one.note} |"
         )
     return "\n".join(lines) + "\n"
 
 
-def main() -> None:
-    """Measure everything on the demo's clips, print the table, keep it in bench/report.md."""
+def main(names: list[str]) -> None:
+    """Measure, print the table, and keep it in bench/report.md when nothing was left out."""
     benchmark = open_benchmark(HERE.parent / "demo")
-    videos = sorted(benchmark.videos.glob("*.mp4"))
-    run_demo(HERE.parent / "site", None, 0)  # the submissions that the site is measured with
-    jobs: list[tuple[Callable[..., list[Measure]], tuple[object, ...]]] = [
-        (keyframes.measure, (videos,)),
-        (embedding.measure, ()),
-        (site.measure, (benchmark,)),
-        (http_client.measure, ()),
-        (clip.measure, ()),
-        (executors.measure, (benchmark,)),
-        (bootstrap.measure, ()),
-    ]
+    known = jobs(benchmark, benchmark)
+    unknown = sorted(set(names) - set(known))
+    if unknown:
+        sys.exit(f"found no measurement {', '.join(unknown)}; expected some of {', '.join(known)}")
+    wanted = names or list(known)
     measures: list[Measure] = []
-    for function, arguments in jobs:
-        # Each in a process of its own: what one has loaded must not slow the next.
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
-            measures += alone.submit(function, *arguments).result()
-        print(f"{len(measures)} measurements", file=sys.stderr)
+    with tempfile.TemporaryDirectory() as scratch:
+        if NEED_SUBMISSIONS & set(wanted):
+            work = Path(scratch) / "demo"
+            run_demo(Path(scratch) / "site", work, 0)
+            known = jobs(benchmark, open_benchmark(work))
+        for name in wanted:
+            function, arguments = known[name]
+            start = time.perf_counter()
+            # Each in a process of its own: what one has loaded must not slow the next.
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
+                measures += alone.submit(function, *arguments).result()
+            print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr)
     text = report(measures)
-    write_text(HERE / "report.md", text)
+    if not names:
+        write_text(HERE / "report.md", text)
     print(text)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 from bench.timing import Measure, interleaved
 from pipeline.data.coool_import import import_coool
@@ -41,7 +42,7 @@ def _peak_mb(run: partial[object]) -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // per_mb
 
 
-def _alone(run: partial[object]) -> int:
+def _alone(run: partial[Any]) -> int:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(_peak_mb, run).result()
 

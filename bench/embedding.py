@@ -36,12 +36,12 @@ for _ in sys.stdin:
 """
 
 
-def sentences() -> list[str]:
-    """400 distinct captions of 5 to 21 words, the same every time."""
-    chance = random.Random(0)  # noqa: S311 (not for secrets)
+def sentences(count: int = SENTENCES, seed: int = 0) -> list[str]:
+    """Distinct captions of 5 to 21 words, the same every time for a seed."""
+    chance = random.Random(seed)  # noqa: S311 (not for secrets)
     words = _WORDS.split()
     made: dict[str, None] = {}
-    while len(made) < SENTENCES:
+    while len(made) < count:
         made[" ".join(chance.choices(words, k=chance.randint(5, 21)))] = None
     return list(made)
 

@@ -109,7 +109,7 @@ def _build(folder: Path) -> None:
     demo = open_benchmark(Path(__file__).parent.parent / "demo")
     build_site(demo, folder, [])
     output = open_output(folder)
-    entries = output.before["media"].values()
+    entries = output.before.media.values()
     pictures = [media_from_json(entry["media"]) for entry in entries]
     output.kept({path: digest for entry in entries for path, digest in entry["files"].items()})
     with tempfile.TemporaryDirectory() as scratch:
@@ -123,8 +123,8 @@ def _build(folder: Path) -> None:
         }
         board = _board([row for rows in truth.values() for row in rows], chance)
         data = gather(benchmark, truth, {}, media, board)
-        put_pages(output, data, open_embedder(), lambda what, done, total: None)
-        output.finish({})
+        digest = put_pages(output, data, open_embedder(), lambda what, done, total: None)
+        output.finish(digest, {}, "", {})
 
 
 def _text(chance: random.Random) -> tuple[str, str]:

@@ -16,7 +16,7 @@ REBUILDS_A_ROUND = 3
 def measure(benchmark: Benchmark) -> list[Measure]:
     """Full builds into new folders and rebuilds of the same folders, in turns.
 
-    The submissions of the benchmark are those that `coooler demo` has stored there.
+    The submissions are those that are stored in the benchmark.
     """
     board = evaluate_board(benchmark)
     full: list[float] = []
