@@ -77,6 +77,7 @@ def _opened(page: Page, address: str) -> tuple[float, float]:
     """First contentful paint and the end of loading, ms after the navigation began."""
     page.goto(address)
     page.wait_for_load_state("load")
+    page.wait_for_function("() => performance.getEntriesByName('first-contentful-paint').length")
     found: Any = page.evaluate(
         "[performance.getEntriesByName('first-contentful-paint')[0].startTime,"
         " performance.getEntriesByType('navigation')[0].domInteractive]"
