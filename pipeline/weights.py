@@ -9,6 +9,7 @@ import io
 import json
 import math
 import pickle
+import pickletools
 import zipfile
 import zlib
 from collections import OrderedDict
@@ -191,6 +192,18 @@ class _RestrictedUnpickler(pickle.Unpickler):
         raise pickle.UnpicklingError("a storage of unknown form")
 
 
+def _load_restricted(stream: io.BytesIO) -> Any:
+    """The next pickle of a stream. One that names a place in the memo beyond its own bytes is refused:
+    the unpickler would make room for all places before it.
+    """
+    start, size = stream.tell(), len(stream.getbuffer())
+    for opcode, argument, _ in pickletools.genops(stream):
+        if opcode.name in {"PUT", "BINPUT", "LONG_BINPUT"} and not 0 <= (argument or 0) < size:
+            raise pickle.UnpicklingError(f"place {argument:,} in the memo of {size:,} bytes")
+    stream.seek(start)
+    return _RestrictedUnpickler(stream).load()
+
+
 def read_torch_legacy(data: bytes, what: str) -> Tensors:
     """Every tensor of a state dict that torch saved in its legacy format (before torch 1.6).
 
@@ -207,7 +220,7 @@ def read_torch_legacy(data: bytes, what: str) -> Tensors:
 
     stream = io.BytesIO(data)
     try:
-        parts = [_RestrictedUnpickler(stream).load() for _ in range(5)]
+        parts = [_load_restricted(stream) for _ in range(5)]
     except Exception as error:  # a hostile pickle can raise nearly anything
         raise wrong(str(error)[:200]) from error
     magic, protocol, _, state, keys = parts

@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import sys
+import tracemalloc
 import types
 import zipfile
 from pathlib import Path
@@ -205,6 +206,17 @@ def test_legacy_files_of_other_forms_are_refused(torch: Any) -> None:
     for data in hostile:
         with pytest.raises(InputError, match=r"w\.pth: found "):
             read_torch_legacy(data, "w.pth")
+
+
+def test_a_short_pickle_takes_no_large_memory() -> None:
+    place = pickle.LONG_BINPUT + (2**24).to_bytes(4, "little")
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="place 16,777,216 in the memo"):
+            read_torch_legacy(pickle.PROTO + b"\x02" + pickle.NONE + place + pickle.STOP, "w.pth")
+        assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize(
