@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from pipeline.files import sha256_file
+from sitegen.listings import Touch, touch_of
 
 MANIFEST = ".coooler-manifest.json"
 FORMAT = 2
@@ -39,18 +40,14 @@ class Manifest:
         names = ("files", "pages", "media", "tree", "inputs", "clips")
         return json.dumps({"format": FORMAT} | {name: getattr(self, name) for name in names}, sort_keys=True)
 
-    def is_untouched(self, path: Path, size: int) -> bool:
+    def is_untouched(self, touch: Touch | None, size: int) -> bool:
         """Whether a file has the size that it had, and was not touched since the manifest was written."""
-        try:
-            stat = path.stat()
-        except OSError:
-            return False
-        return stat.st_size == size and max(stat.st_mtime_ns, stat.st_ctime_ns) < self.time_ns
+        return touch is not None and touch[0] == size and max(touch[1:]) < self.time_ns
 
     def content(self, clip: Path) -> Content:
         """Hash and size of a clip; it is read only when it may have changed."""
         known = self.clips.get(clip.name)
-        if known and self.is_untouched(clip, known[1]):
+        if known and self.is_untouched(touch_of(clip), known[1]):
             return known
         return sha256_file(clip), clip.stat().st_size
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.files import fsynced, sha256_file, sha256_of, sync_listing, write_bytes
+from sitegen.listings import Touch, listing
 from sitegen.manifest import MANIFEST, Manifest, read_manifest
 
 STAGED = ".coooler-next"
@@ -39,12 +40,13 @@ _WAITING = 64  # files in memory that wait for a writer
 class Output:
     """Collects what belongs to the site in `folder`; `finish` then puts it there.
 
-    `files` maps a path to the SHA-256 of its content, a page's without the tree's hash; `pages` maps a
-    page to the key of what it shows.
+    `there` is what lies in the folder; `files` maps a path to the SHA-256 of its content, a page's
+    without the tree's hash; `pages` maps a page to the key of what it shows.
     """
 
     folder: Path
     before: Manifest
+    there: Mapping[str, Touch]
     files: dict[str, str] = field(default_factory=dict)
     sizes: dict[str, int] = field(default_factory=dict)
     pages: dict[str, str] = field(default_factory=dict)
@@ -183,17 +185,20 @@ class Output:
 
     def _is_there(self, path: str, digest: str, size: int) -> bool:
         """Whether the folder holds this content, looked into only where the file may have changed."""
-        target = self.folder / path
-        if self.before.files.get(path) == (digest, size) and self.before.is_untouched(target, size):
+        if self.before.files.get(path) == (digest, size) and self._is_untouched(path, size):
             return True
         self._doubtful = True
+        target = self.folder / path
         return target.is_file() and target.stat().st_size == size and sha256_file(target) == digest
 
+    def _is_untouched(self, path: str, size: int) -> bool:
+        return self.before.is_untouched(self.there.get(path), size)
+
     def _page_is_there(self, path: str, digest: str, size: int) -> bool:
-        target = self.folder / path
-        if self.before.is_untouched(target, size):
+        if self._is_untouched(path, size):
             return True
         self._doubtful = True
+        target = self.folder / path
         if not target.is_file() or target.stat().st_size != size:
             return False
         page = target.read_bytes()
@@ -231,7 +236,7 @@ def open_output(folder: Path) -> Output:
     if (folder / STAGED / COMMIT).is_file():
         _carry_out(folder)
         shutil.rmtree(folder / STAGED)
-    return Output(folder, read_manifest(folder / MANIFEST))
+    return Output(folder, read_manifest(folder / MANIFEST), listing(folder))
 
 
 def _carry_out(folder: Path) -> int:

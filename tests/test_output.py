@@ -99,8 +99,9 @@ def test_a_copied_site_is_looked_into_once(tmp_path: Path) -> None:
         os.utime(tmp_path / path)
     time.sleep(0.02)  # a file system's clock ticks a few times in this
     assert put(tmp_path, BEFORE, "i").written == 0
-    before = open_output(tmp_path).before
-    assert all(before.is_untouched(tmp_path / path, size) for path, (_, size) in before.files.items())
+    output = open_output(tmp_path)
+    before, there = output.before, output.there
+    assert all(before.is_untouched(there[path], size) for path, (_, size) in before.files.items())
 
 
 def test_a_build_that_fails_leaves_the_site(tmp_path: Path) -> None:
