@@ -30,7 +30,7 @@ from pipeline.minilm import OnnxEmbedder, find_embedder
 from pipeline.records import Prediction, TruthHazard
 from pipeline.tables import BOXES, PREDICTIONS, TRUTH
 from sitegen.about import Sender
-from sitegen.board import build_board, evaluate_board
+from sitegen.board import evaluate_board, rebuild_board
 from sitegen.readers import read_predictions, read_truth
 from sitegen.submissions import store
 
@@ -104,18 +104,18 @@ def board_of(root: Path, clips: list[Path], videos: int, rounds: int, full_round
         if turn < full_rounds:
             shutil.rmtree(root / "site", ignore_errors=True)
             with timed(times, "full"):
-                build_board(benchmark, root / "site")
+                rebuild_board(benchmark, root / "site")
         with timed(times, "nothing"):
-            build_board(benchmark, root / "site")
+            rebuild_board(benchmark, root / "site")
         change_truth(benchmark, turn)
         with timed(times, "truth"):
-            build_board(benchmark, root / "site")
+            rebuild_board(benchmark, root / "site")
         if turn < full_rounds:
             submit(benchmark, f"New {turn}", sentences(videos, seed=10 + turn))
             with timed(times, "embed"):
                 embedder.embed(sentences(videos, seed=100 + turn))
             with timed(times, "submission"):
-                build_board(benchmark, root / "site")
+                rebuild_board(benchmark, root / "site")
     shutil.rmtree(root)
     spent = {what: statistics.median(values) for what, values in times.items()}
     what = f"rebuild of {videos:,} videos x {SYSTEMS} systems,"
@@ -162,19 +162,19 @@ def one_more_video(root: Path, rounds: int = 5) -> list[Measure]:
     benchmark = write_benchmark(root / "benchmark", clips, 3)
     BOXES.write(benchmark.boxes, boxes)
     truth = read_truth(benchmark.truth)
-    build_board(benchmark, root / "site")
+    rebuild_board(benchmark, root / "site")
     times: Times = defaultdict(list)
     for _ in range(rounds):
         os.link(new_clip, benchmark.videos / new_clip.name)
         TRUTH.write(benchmark.truth, [*truth, TruthHazard(last, "1", "car", "A car brakes")])
         with timed(times, "one"):
-            build_board(benchmark, root / "site")
+            rebuild_board(benchmark, root / "site")
         with timed(times, "full"):
-            build_board(benchmark, root / "full")
+            rebuild_board(benchmark, root / "full")
         shutil.rmtree(root / "full")
         (benchmark.videos / new_clip.name).unlink()
         TRUTH.write(benchmark.truth, truth)
-        build_board(benchmark, root / "site")
+        rebuild_board(benchmark, root / "site")
     one, full = statistics.median(times["one"]), statistics.median(times["full"])
     what = f"rebuild of {len(clips) + 1} videos x 3 systems, one video new"
     return [Measure(what, one, "full build", full, "at most 0.15", f"medians of {rounds}")]

@@ -11,18 +11,19 @@ from pipeline.files import locked, slug
 from pipeline.minilm import open_embedder
 from pipeline.records import TruthHazard
 from pipeline.scores import Submission
-from pipeline.table import metadata
 from pipeline.tables import TRUTH
 from sitegen import about as about_file
 from sitegen import ledger
 from sitegen.about import Sender
 from sitegen.build import BuildReport, build_site
 from sitegen.evaluate import embed_all, evaluate, texts_of, truth_sha256
-from sitegen.packing import EXTRAS
 from sitegen.probes import probe_board
 from sitegen.readers import ReadOptions, ReadPredictions, read_predictions, read_truth
+from sitegen.run_folder import extras_of, predictions_of, with_agents
+from sitegen.scoreboard import board_lines
 from sitegen.standings import Standing
 from sitegen.submissions import StoredSubmission, load_all, rescore, store
+from sitegen.untouched import Built, kept_truth, recall, remember, sources
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -59,26 +60,6 @@ def submit_file(
         why=why,
         today=today,
     )
-
-
-def predictions_of(file: Path) -> Path:
-    """The predictions file meant by a file, or by the folder of a run."""
-    return file / "predictions.parquet" if file.is_dir() else file
-
-
-def extras_of(file: Path) -> dict[str, Path]:
-    """Table name -> file of what a run noted beside its predictions; nothing for a plain file."""
-    if not file.is_dir():
-        return {}
-    extras = {name: file / f"{name}.parquet" for name in EXTRAS}
-    return {name: path for name, path in extras.items() if path.is_file()}
-
-
-def with_agents(sender: Sender, file: Path) -> Sender:
-    """The sender, with the agents that a run folder names, unless the sender named some."""
-    if sender.agents or not file.is_dir():
-        return sender
-    return replaced(sender, agents=metadata(predictions_of(file)).get("agents", ""))
 
 
 def submit_read(
@@ -179,15 +160,37 @@ def build_board(
     board of a day and notes nothing. One process at a time builds into a folder.
     """
     with locked(out):
-        board = evaluate_board(benchmark, as_of)
-        if not as_of and board:
-            _keep_truth(benchmark, read_truth(benchmark.truth))
-            cards = {one.stored.slug: one.evaluation.card for one in board}
-            if rescore(benchmark.submissions, cards, today or FIRST_DAY):
-                board = _histories(benchmark, board)
-        then = as_it_was(benchmark, as_of) if as_of else benchmark
-        report = build_site(then, out, board, bar, as_of=as_of, embedder=open_embedder())
-    return board, report
+        return _build(benchmark, out, bar, as_of, today)
+
+
+def rebuild_board(
+    benchmark: Benchmark, out: Path, bar: "Progress | None" = None, *, as_of: str = "", today: str = ""
+) -> Built:
+    """`build_board`, which ends at once when neither the benchmark nor the site was touched since."""
+    with locked(out):
+        made_by, found = f"{open_embedder().sha256} {as_of}", sources(benchmark)
+        same = recall(benchmark, out, made_by, found)
+        if same:
+            return same
+        board, report = _build(benchmark, out, bar, as_of, today)
+        last = [one.history[-1] for one in board if one.history]
+        rescored = [f"{one.date}: {one.slug}: {one.reason}" for one in last if one.event == "rescore"]
+        built = Built(board_lines([one.evaluation for one in board]), tuple(rescored), report)
+        remember(benchmark, built, made_by, found)
+    return built
+
+
+def _build(
+    benchmark: Benchmark, out: Path, bar: "Progress | None", as_of: str, today: str
+) -> tuple[list[Standing], BuildReport]:
+    board = evaluate_board(benchmark, as_of)
+    if not as_of and board:
+        _keep_truth(benchmark, read_truth(benchmark.truth))
+        cards = {one.stored.slug: one.evaluation.card for one in board}
+        if rescore(benchmark.submissions, cards, today or FIRST_DAY):
+            board = _histories(benchmark, board)
+    then = as_it_was(benchmark, as_of) if as_of else benchmark
+    return board, build_site(then, out, board, bar, as_of=as_of, embedder=open_embedder())
 
 
 def _submission(sender: Sender, read: ReadPredictions) -> Submission:
@@ -232,7 +235,7 @@ def _histories(benchmark: Benchmark, board: Sequence[Standing]) -> list[Standing
 
 def _kept_truth(benchmark: Benchmark, digest: str) -> Path:
     """Where the truth of a hash, or of its first 12 characters, is kept for `as_of`."""
-    return benchmark.truth.with_name(f"{benchmark.truth.stem}-history") / f"{digest[:12]}.parquet"
+    return kept_truth(benchmark) / f"{digest[:12]}.parquet"
 
 
 def _keep_truth(benchmark: Benchmark, truth: Sequence[TruthHazard]) -> None:

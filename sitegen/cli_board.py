@@ -17,6 +17,7 @@ from sitegen.cli_common import (
     here,
     options_of,
     print_board,
+    print_lines,
     read_file,
     say_warnings,
     today,
@@ -65,8 +66,9 @@ def submit(
     as_json: JsonOption = False,
 ) -> None:
     """Check a predictions file, add it to the benchmark folder, print its scores, rebuild the site."""
-    from sitegen.board import build_board, extras_of, submit_read, with_agents
+    from sitegen.board import build_board, submit_read
     from sitegen.rehearsal import report
+    from sitegen.run_folder import extras_of, with_agents
 
     benchmark = here()
     given = {
@@ -207,7 +209,7 @@ def build(
     from datetime import date
 
     from pipeline.errors import InputError
-    from sitegen.board import build_board
+    from sitegen.board import rebuild_board
     from sitegen.strict import strict_faults
 
     try:
@@ -216,9 +218,9 @@ def build(
         raise typer.BadParameter(f"found {as_of!r}; expected a date as YYYY-MM-DD") from error
     folder = out or Path("site")
     with console.progress() as bar:
-        board, report = build_board(here(), folder, bar, as_of=day, today=today())
+        built = rebuild_board(here(), folder, bar, as_of=day, today=today())
+    report = built.report
     faults = strict_faults(folder) if strict else []
-    rescored = [one.history[-1] for one in board if one.history and one.history[-1].event == "rescore"]
     if as_json:
         console.print_json(
             {
@@ -235,9 +237,9 @@ def build(
         if faults:
             raise InputError(f"{len(faults)} faults in the site.")
         return
-    print_board([one.evaluation for one in board])
-    for entry in rescored:
-        console.stderr().print(f"rescored {entry.date}: {entry.slug}: {entry.reason}", markup=False)
+    print_lines(built.board)
+    for line in built.rescored:
+        console.stderr().print(f"rescored {line}", markup=False)
     console.stdout().print(
         f"{folder / 'index.html'}  ({report.written} files written, {report.unchanged} unchanged, "
         f"{report.removed} removed; tree {report.tree_sha256[:12]})",

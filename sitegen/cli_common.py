@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pipeline.records import TruthHazard
     from pipeline.scores import Evaluation, Submission
     from sitegen.readers import ReadOptions, ReadPredictions
+    from sitegen.scoreboard import BoardLine
 
 FileArgument = Annotated[
     Path, typer.Argument(help="Predictions in any format that `check` knows, or a run folder.")
@@ -67,8 +68,8 @@ def read_file(
 
     A Parquet file is read in a process of its own: a damaged one can end the process that reads it.
     """
-    from sitegen.board import predictions_of
     from sitegen.readers import read_predictions
+    from sitegen.run_folder import predictions_of
     from sitegen.sandbox import read_apart
 
     path = predictions_of(file)
@@ -103,33 +104,32 @@ def say_warnings(warnings: Sequence[str]) -> None:
 
 def print_board(evaluations: "Sequence[Evaluation]") -> None:
     """The scores as a table, best first, with their 95 % intervals and the one signature that they share."""
+    from sitegen.scoreboard import board_lines
+
+    print_lines(board_lines(evaluations))
+
+
+def print_lines(lines: "Sequence[BoardLine]") -> None:
+    """The lines of a board as a table, with the one signature that they share."""
     from rich.table import Table
 
-    from sitegen.leaderboard import rank
-    from sitegen.uncertainty import uncertainties
-
-    if not evaluations:
+    if not lines:
         console.stdout().print("no submissions yet: coooler submit FILE --name NAME", markup=False)
         return
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("rank", "submission", "BESM", "95 %", "SAM", "detection", "hazard recall", "videos"):
         table.add_column(heading, justify="left" if heading == "submission" else "right")
-    rows = rank(evaluations, "besm", uncertainties(evaluations))
-    bands = [row.rank for row in rows]
-    for row in rows:
-        card = row.evaluation.card
-        recall = "-" if card.hazard_recall is None else f"{card.hazard_recall:.4f}"
-        interval = row.uncertainty.besm if row.uncertainty else None
+    for line in lines:
         table.add_row(
-            f"{row.rank}=" if bands.count(row.rank) > 1 else str(row.rank),
-            row.evaluation.submission.name,
-            f"{card.besm:.4f}",
-            f"{interval.low:.4f} to {interval.high:.4f}" if interval else "",
-            f"{card.sam:.4f}",
-            f"{card.detection_rate:.4f}",
-            recall,
-            str(card.n_videos),
+            f"{line.rank}=" if line.shared else str(line.rank),
+            line.name,
+            f"{line.besm:.4f}",
+            f"{line.low:.4f} to {line.high:.4f}",
+            f"{line.sam:.4f}",
+            f"{line.detection_rate:.4f}",
+            "-" if line.hazard_recall is None else f"{line.hazard_recall:.4f}",
+            str(line.n_videos),
         )
     output = console.stdout()
     output.print(table)
-    output.print(f"signature {evaluations[0].card.signature}", markup=False, soft_wrap=True)
+    output.print(f"signature {lines[0].signature}", markup=False, soft_wrap=True)

@@ -106,9 +106,9 @@ def _annotate(faults: "Sequence[Fault]", warnings: "Sequence[str]", file: Path) 
 def _fixed(file: Path, hazards: Any, options: "ReadOptions") -> "tuple[Path, tuple[str, ...], ReadOptions]":
     """A corrected copy beside the file, what was done, how to read it; the file itself if nothing was."""
     from pipeline.files import write_bytes
-    from sitegen.board import predictions_of
     from sitegen.fixes import fixed
     from sitegen.readers import ReadOptions
+    from sitegen.run_folder import predictions_of
 
     path = predictions_of(file)
     made = fixed(path, hazards, options)

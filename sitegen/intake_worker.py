@@ -169,7 +169,7 @@ class Worker:
 def make_worker(benchmark: "Benchmark", site: Path, intake: Intake, limits: Limits | None = None) -> Worker:
     """The worker of a benchmark: reads apart, checks or submits, builds the board into `site`."""
     from sitegen.about import Sender
-    from sitegen.board import build_board, known_videos, rehearse, submit_read
+    from sitegen.board import known_videos, rebuild_board, rehearse, submit_read
     from sitegen.rehearsal import report as told
 
     def read(upload: Upload, path: Path) -> ReadPredictions:
@@ -194,7 +194,7 @@ def make_worker(benchmark: "Benchmark", site: Path, intake: Intake, limits: Limi
         return _report(read, _scores(standing.evaluation.card), standing.stored.slug)
 
     def rebuild() -> None:
-        build_board(benchmark, site, today=_today())
+        rebuild_board(benchmark, site, today=_today())
 
     return Worker(intake, read=read, check=check, accept=accept, rebuild=rebuild, root=benchmark.root)
 

@@ -106,6 +106,7 @@ FLOORS = [
         "sitegen.blocks",
         "sitegen.intake_limits",
         "sitegen.language",
+        "sitegen.listings",
         "sitegen.words",
     ],
     [
@@ -176,6 +177,7 @@ FLOORS = [
         "sitegen.probes",
         "sitegen.readers",
         "sitegen.rewrite",
+        "sitegen.scoreboard",
     ],
     [
         "sitegen.coool_score",
@@ -198,6 +200,7 @@ FLOORS = [
         "sitegen.page_method",
         "sitegen.page_submit",
         "sitegen.page_vote",
+        "sitegen.run_folder",
         "sitegen.sandbox",
         "sitegen.sayings",
         "sitegen.submissions",
@@ -208,6 +211,7 @@ FLOORS = [
     [
         "sitegen.annotate_clips",
         "sitegen.blame",
+        "sitegen.cli_common",
         "sitegen.compare_files",
         "sitegen.exports",
         "sitegen.page_failures",
@@ -217,7 +221,11 @@ FLOORS = [
         "sitegen.transcript",
     ],
     [
+        "sitegen.cli_data_check",
+        "sitegen.cli_data_frames",
         "sitegen.cli_data_import",
+        "sitegen.cli_data_restore",
+        "sitegen.cli_score_coool",
         "sitegen.gather",
         "sitegen.page_board",
         "sitegen.page_compare",
@@ -225,9 +233,14 @@ FLOORS = [
     ],
     [
         "sitegen.card_data",
+        "sitegen.cli_data_propose",
+        "sitegen.cli_data_rebuild",
+        "sitegen.cli_export",
+        "sitegen.cli_files",
         "sitegen.page_restoration",
     ],
     [
+        "sitegen.cli_data_split",
         "sitegen.page_video",
     ],
     [
@@ -245,34 +258,27 @@ FLOORS = [
     ],
     [
         "sitegen.annotate_app",
-        "sitegen.board",
+        "sitegen.untouched",
     ],
     [
         "sitegen.annotate_server",
-        "sitegen.cli_common",
+        "sitegen.board",
+    ],
+    [
+        "sitegen.cli_data_annotate",
         "sitegen.demo",
         "sitegen.intake_worker",
         "sitegen.verify",
     ],
     [
         "sitegen.cli_board",
-        "sitegen.cli_data_annotate",
-        "sitegen.cli_data_check",
-        "sitegen.cli_data_frames",
-        "sitegen.cli_data_restore",
-        "sitegen.cli_data_split",
-        "sitegen.cli_score_coool",
+        "sitegen.cli_data",
         "sitegen.intake_app",
     ],
     [
-        "sitegen.cli_data_propose",
-        "sitegen.cli_data_rebuild",
-        "sitegen.cli_export",
-        "sitegen.cli_files",
         "sitegen.intake_server",
     ],
     [
-        "sitegen.cli_data",
         "sitegen.cli_site",
     ],
     [

@@ -1,0 +1,29 @@
+"""What a user names as a predictions file: the file, or the folder of a run with all that it noted."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from sitegen.about import Sender
+from sitegen.packing import EXTRAS
+
+
+def predictions_of(file: Path) -> Path:
+    """The predictions file meant by a file, or by the folder of a run."""
+    return file / "predictions.parquet" if file.is_dir() else file
+
+
+def extras_of(file: Path) -> dict[str, Path]:
+    """Table name -> file of what a run noted beside its predictions; nothing for a plain file."""
+    if not file.is_dir():
+        return {}
+    extras = {name: file / f"{name}.parquet" for name in EXTRAS}
+    return {name: path for name, path in extras.items() if path.is_file()}
+
+
+def with_agents(sender: Sender, file: Path) -> Sender:
+    """The sender, with the agents that a run folder names, unless the sender named some."""
+    if sender.agents or not file.is_dir():
+        return sender
+    from pipeline.table import metadata
+
+    return replace(sender, agents=metadata(predictions_of(file)).get("agents", ""))
