@@ -27,6 +27,9 @@ from sitegen.words import shorten, visible
 CONSTANT, WORD_BAG, SHUFFLED, STUFFING, NEAR_COPY, TRUTH_COPY = 0.5, 0.5, 0.9, 5.0, 0.8, 0.1
 """From where on each probe is remarkable; for stuffing: above which (ours)."""
 
+EXCHANGED = 2_000
+"""Videos up to which each has the captions of every other one in turn (ours)."""
+
 _LEAST = 3  # videos or captions, from which on a share says something
 _LEAST_SHUFFLED = 5
 _LEAST_COPIES = 2
@@ -152,19 +155,48 @@ def exchange(
     """BESM and detection of the videos with a hazard when each has the captions of another one.
 
     Each video is scored with the captions of every other one, and the mean is taken: this is what
-    random shuffles that leave no video its own captions come to. `hazard_video` (H,) is ascending,
-    `hazard_text` (H,) are rows of `units`. A video without captions scores 0.
+    random shuffles that leave no video its own captions come to. Over `EXCHANGED` videos that is within
+    groups of at most so many, drawn by a fixed seed, so that time grows with the videos and not with
+    their square. `hazard_video` (H,) is ascending, `hazard_text` (H,) are rows of `units`. A video
+    without captions scores 0.
     """
     videos = np.unique(hazard_video)
     mine = np.isin(captions.video, videos)
     # The same text twice in a video changes neither its best nor its worst.
     said = np.unique(captions.video[mine] * len(units) + captions.text[mine])
     video, text = said // max(len(units), 1), said % max(len(units), 1)
-    besm, detected = np.zeros(2), np.zeros(2)  # of all pairs of videos, of each with itself
+    n = len(videos)
+    own_besm = own_detected = other_besm = other_detected = 0.0
+    for group in _exchange_groups(videos):
+        here, there = np.isin(video, group), np.isin(hazard_video, group)
+        besm, detected = _exchanged(
+            video[here], units[text[here]], hazard_video[there], units[hazard_text[there]], threshold
+        )
+        others = max(len(group) - 1, 1)
+        own_besm += float(besm[1]) / max(n, 1)
+        other_besm += float(besm[0] - besm[1]) / max(n, 1) / others
+        own_detected += float(detected[1])
+        other_detected += float(detected[0] - detected[1]) / others
+    return Exchange(n, len(np.unique(video)), own_besm, other_besm, own_detected, other_detected)
+
+
+def _exchange_groups(videos: Index) -> list[Index]:
+    """The videos in as few groups as have at most `EXCHANGED` each, drawn by a fixed seed."""
+    if len(videos) <= EXCHANGED:
+        return [videos]
+    drawn = np.random.default_rng(0).permutation(videos)
+    return np.array_split(drawn, -(-len(videos) // EXCHANGED))
+
+
+def _exchanged(
+    video: Index, said: Real, hazard_video: Index, described: Real, threshold: float
+) -> tuple[Real, Real]:
+    """BESM and detected videos, each summed over all pairs of videos, and of each with itself: (2,)."""
+    besm, detected = np.zeros(2), np.zeros(2)
     for rows, of_video in whole_blocks(video):
-        vectors = units[text[rows]].astype(np.float32)
+        vectors = said[rows].astype(np.float32)
         for hazards, of_hazard in whole_blocks(hazard_video):
-            cosines = (vectors @ units[hazard_text[hazards]].astype(np.float32).T).T
+            cosines = (vectors @ described[hazards].astype(np.float32).T).T
             # Each caption takes its best-matching hazard, as in the score.
             matched = np.ascontiguousarray(over_runs(np.maximum, cosines, of_hazard).T)
             best = np.clip(over_runs(np.maximum, matched, of_video), 0.0, 1.0).astype(np.float64)
@@ -173,16 +205,7 @@ def exchange(
             both, found = (best + worst) / 2, passes(best, threshold)
             besm += both.sum(), both[own].sum()
             detected += found.sum(), found[own].sum()
-    n = len(videos)
-    others = max(n - 1, 1)
-    return Exchange(
-        videos=n,
-        said=len(np.unique(video)),
-        own_besm=float(besm[1]) / max(n, 1),
-        other_besm=float(besm[0] - besm[1]) / max(n, 1) / others,
-        own_detected=float(detected[1]),
-        other_detected=float(detected[0] - detected[1]) / others,
-    )
+    return besm, detected
 
 
 def _constant(captions: NumberedCaptions) -> Probe:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pipeline.records import Prediction, TruthHazard
 from pipeline.scores import Submission
-from sitegen.copies import number_captions, number_forms, plain
+from sitegen.copies import NumberedCaptions, number_captions, number_forms, plain
 from sitegen.evaluate import TextVectors, evaluate, texts_of
 from sitegen.probes import Probe, exchange, is_bag, probe_board, word_bags
 from sitegen.score import unit_rows
@@ -228,6 +228,22 @@ def test_exchange_is_what_the_scores_say_of_every_rotation(seed: int, blocks: bo
     assert (found.own_besm, found.own_detected) == pytest.approx((besm[0], detected[0]), abs=1e-6)
     expected = np.mean(besm[1:]), np.mean(detected[1:])
     assert (found.other_besm, found.other_detected) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("most", [3, 4])
+def test_exchange_in_groups(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    """Where all videos are alike it does not matter with which of them captions are exchanged."""
+    videos = np.repeat(np.arange(7), 2)
+    captions = NumberedCaptions(videos, np.tile([0, 1], 7), np.tile([0, 1], 7))
+    units = np.array([[1.0, 0.0], [0.6, 0.8], [0.0, 1.0]])
+    hazards = np.arange(7), np.full(7, 2)
+    whole = exchange(captions, *hazards, units, 0.7)
+    monkeypatch.setattr("sitegen.probes.EXCHANGED", most)
+    found = exchange(captions, *hazards, units, 0.7)
+    assert (found.videos, found.said) == (7, 7)
+    assert (found.own_besm, found.other_besm) == pytest.approx((0.4, 0.4), abs=1e-6)  # (0.8 + 0) / 2
+    assert (whole.own_besm, whole.other_besm) == pytest.approx((0.4, 0.4), abs=1e-6)
+    assert (found.own_detected, found.other_detected) == pytest.approx((7, 7))
 
 
 class Embedder:
