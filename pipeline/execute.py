@@ -9,6 +9,8 @@ memory than ten.
 import multiprocessing
 import os
 import pickle
+import re
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -34,6 +36,8 @@ TRIES = 3
 AHEAD = 2
 # How often a Ray cluster is asked for its size, which changes as nodes come and go.
 LOOK_EVERY_S = 5.0
+# How long the head node of a cluster may take to answer.
+KNOCK_S = 5.0
 
 
 class SerialExecutor:
@@ -198,17 +202,20 @@ class RayExecutor:
 
     def _connect(self) -> None:
         ray = self._ray
+        named = re.fullmatch(r"(?:ray://)?\[?([^/]+?)\]?:(\d+)", self._address or "")
         try:
+            if named:  # where nobody listens, Ray itself tries for minutes and then ends the process
+                socket.create_connection((named[1], int(named[2])), KNOCK_S).close()
             ray.init(
                 address=self._address,
                 log_to_driver=False,
                 logging_level="error",
                 include_dashboard=None if self._address else False,
             )
-        except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+        except (OSError, OverflowError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
             where = self._address or "this machine"
             raise OutsideError(
-                f"found no usable Ray cluster at {where} ({str(error).splitlines()[0][:200]}); expected one "
+                f"found no usable Ray cluster at {where} ({str(error)[:200]}); expected one "
                 "with this Python and this Ray. Check --address, and `ray status` on its head node."
             ) from error
 
