@@ -1,8 +1,9 @@
-"""Our embedder against sentence-transformers on torch: the same weights, the same 400 sentences.
+"""Our embedder against a bare onnxruntime loop and sentence-transformers: the same weights and sentences.
 
-The other runs in a child process that stays open, and the two take turns, so that whatever else
-the machine does hits both. COOOLER_BENCH_TORCH names a Python that has sentence-transformers;
-without it this one is tried.
+The bare loop gets token ids that were made before the clock starts, sorted by length, in batches of
+16 padded to their longest. sentence-transformers, on torch, runs in a child process that stays open,
+and all take turns, so that whatever else the machine does hits each. COOOLER_BENCH_TORCH names a
+Python that has sentence-transformers; without it this one is tried.
 """
 
 import os
@@ -14,9 +15,12 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from bench.timing import Measure, interleaved
 from pipeline.errors import ModelMissingError
-from pipeline.minilm import OnnxEmbedder, find_embedder
+from pipeline.minilm import BATCH, OnnxEmbedder, find_embedder
+from pipeline.vector_cache import CachedEmbedder
 
 SENTENCES = 400
 
@@ -46,8 +50,23 @@ def sentences(count: int = SENTENCES, seed: int = 0) -> list[str]:
     return list(made)
 
 
+def bare_loop(ours: OnnxEmbedder, texts: list[str]) -> Callable[[], object]:
+    """A loop over the same session with nothing around it; the embedder has run once before."""
+    ids = sorted((coded.ids for coded in ours._tokenizer.encode_batch(texts)), key=len)
+    batches = []
+    for start in range(0, len(ids), BATCH):
+        part = ids[start : start + BATCH]
+        tokens = np.zeros((len(part), len(part[-1])), np.int64)
+        mask = np.zeros_like(tokens)
+        for row, one in enumerate(part):
+            tokens[row, : len(one)], mask[row, : len(one)] = one, 1
+        feeds = {"input_ids": tokens, "attention_mask": mask, "token_type_ids": np.zeros_like(tokens)}
+        batches.append({name: value for name, value in feeds.items() if name in ours._inputs})
+    return lambda: [ours._session.run([ours._output], feeds) for feeds in batches]
+
+
 def measure() -> list[Measure]:
-    """One row; without sentence-transformers it has no peer and says so.
+    """Three rows; without sentence-transformers the second has no peer and says so.
 
     Raises ModelMissingError when the embedder is not installed as its package.
     """
@@ -56,9 +75,16 @@ def measure() -> list[Measure]:
         raise ModelMissingError("The benchmark needs the packaged embedder: see `coooler models`.")
     texts = sentences()
     ours = OnnxEmbedder(root)
-    functions: dict[str, Callable[[], object]] = {"ours": lambda: ours.embed(texts)}
+    ours.embed(texts[:1])
+    functions: dict[str, Callable[[], object]] = {
+        "ours": lambda: ours.embed(texts),
+        "bare": bare_loop(ours, texts),
+    }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        CachedEmbedder(ours, folder / "vectors").embed(texts)
+        # A new one each time, as each command opens one: the vectors are on disk, not in memory.
+        functions["cached"] = lambda: CachedEmbedder(ours, folder / "vectors").embed(texts)
         with zipfile.ZipFile(root) as archive:
             archive.extractall(folder / "model")
         (folder / "sentences").write_text("\n".join(texts), encoding="utf-8")
@@ -89,15 +115,25 @@ def measure() -> list[Measure]:
             times = interleaved(functions)
             asked.close()
     note = "" if "theirs" in times else "not installed: set COOOLER_BENCH_TORCH to a Python that has it"
+    what = f"embed {SENTENCES} captions (all-MiniLM-L6-v2, fp32)"
     return [
         Measure(
-            f"embed {SENTENCES} captions (all-MiniLM-L6-v2, fp32, no cache)",
+            f"{what}, no cache",
+            times["ours"],
+            f"bare onnxruntime loop over sorted batches of {BATCH}",
+            times["bare"],
+            "at most 1.1",
+            "tokens made before the clock starts; ours tokenises",
+        ),
+        Measure(
+            f"{what}, no cache",
             times["ours"],
             "sentence-transformers on torch",
             times.get("theirs"),
             "at most 1.0",
             note,
-        )
+        ),
+        Measure(f"{what}, the second time", times["cached"], "the first time", times["ours"], "at most 0.1"),
     ]
 
 

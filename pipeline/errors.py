@@ -68,6 +68,10 @@ class FaultsError(InputError):
         heading = f"{count} fault{'s' if count != 1 else ''} found; nothing was written."
         super().__init__("\n".join([heading, *(f"  {fault}" for fault in self.faults)]))
 
+    def __reduce__(self) -> tuple[type["FaultsError"], tuple[tuple[Fault, ...]]]:
+        """Pickles as its faults: it may be raised in a worker."""
+        return (FaultsError, (self.faults,))
+
 
 class ConfigError(InputError):
     """A configuration that cannot be used."""

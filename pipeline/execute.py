@@ -1,11 +1,18 @@
 """Runs one function over many items: in turn, in threads, in processes, or on a Ray cluster.
 
 Results come as soon as they are there. When a worker dies, the items it had are run again; an item
-that keeps killing its worker gets the result that `lost` gives, and the others go on.
+that keeps killing its worker gets the result that `lost` gives, and the others go on. Items are
+drawn as workers become free, and neither they nor results are kept: ten thousand need no more
+memory than ten.
 """
 
 import multiprocessing
 import os
+import pickle
+import re
+import socket
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -16,9 +23,10 @@ from concurrent.futures import (
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
 from typing import Any, TypeVar
 
-from pipeline.errors import ConfigError
+from pipeline.errors import ConfigError, OutsideError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -26,6 +34,10 @@ R = TypeVar("R")
 TRIES = 3
 # Items handed out beyond those at work, so that no worker waits; few, so that little is lost.
 AHEAD = 2
+# How often a Ray cluster is asked for its size, which changes as nodes come and go.
+LOOK_EVERY_S = 5.0
+# How long the head node of a cluster may take to answer.
+KNOCK_S = 5.0
 
 
 class SerialExecutor:
@@ -46,7 +58,7 @@ class ThreadExecutor:
     def run(self, function: Callable[[T], R], items: Iterable[T], lost: Callable[[T, str], R]) -> Iterator[R]:
         """The results, each as soon as it is there."""
         with ThreadPoolExecutor(self.workers) as pool:
-            for _, future in _bounded(pool, function, enumerate(items), self.workers + AHEAD):
+            for _, future in _bounded(pool, function, iter(items), self.workers + AHEAD):
                 yield future.result()
 
 
@@ -59,19 +71,20 @@ class ProcessExecutor:
 
     def run(self, function: Callable[[T], R], items: Iterable[T], lost: Callable[[T, str], R]) -> Iterator[R]:
         """The results, each as soon as it is there."""
-        left = dict(enumerate(items))
-        while left:
-            suspects: list[int] = []
+        source = iter(items)
+        while True:
+            suspects: list[T] = []
             with _pool(self.workers) as pool:
-                for place, future in _bounded(pool, function, left.items(), self.workers + AHEAD):
+                for item, future in _bounded(pool, function, source, self.workers + AHEAD):
                     if isinstance(future.exception(), BrokenProcessPool):
-                        suspects.append(place)
-                        continue
-                    del left[place]
-                    yield future.result()
+                        suspects.append(item)
+                    else:
+                        yield future.result()
+            if not suspects:
+                return
             # A worker died and took the others along: whose fault it was shows when each runs alone.
-            for place in suspects:
-                yield self._alone(function, left.pop(place), lost)
+            for item in suspects:
+                yield self._alone(function, item, lost)
 
     def _alone(self, function: Callable[[T], R], item: T, lost: Callable[[T, str], R]) -> R:
         for _ in range(TRIES):
@@ -84,31 +97,46 @@ class ProcessExecutor:
 
 def _pool(workers: int) -> ProcessPoolExecutor:
     # Spawned, not forked: onnxruntime's threads do not survive a fork.
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """Let this worker end when its parent was killed: it would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _bounded(
-    pool: Executor, function: Callable[[T], R], items: Iterable[tuple[int, T]], at_once: int
-) -> Iterator[tuple[int, "Future[R]"]]:
-    """(place, finished future) of the (place, item) pairs, at most `at_once` of them handed out.
+    pool: Executor, function: Callable[[T], R], source: Iterator[T], at_once: int
+) -> Iterator[tuple[T, "Future[R]"]]:
+    """(item, finished future) of the items, at most `at_once` of them handed out.
 
-    Stops handing out when the pool broke.
+    Draws no more items when the pool broke.
     """
-    waiting: dict[Future[R], int] = {}
-    source = iter(list(items))
+    waiting: dict[Future[R], T] = {}
     broken = False
     try:
         while True:
-            while not broken and len(waiting) < at_once and (entry := next(source, None)) is not None:
+            for item in islice(source, 0 if broken else at_once - len(waiting)):
                 try:
-                    waiting[pool.submit(function, entry[1])] = entry[0]
-                except BrokenProcessPool:
-                    broken = True
+                    future = pool.submit(function, item)
+                except BrokenProcessPool as error:
+                    future = Future()
+                    future.set_exception(error)
+                waiting[future] = item
             if not waiting:
                 return
             finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in sorted(finished, key=lambda one: waiting[one]):
-                broken = broken or isinstance(future.exception(), BrokenProcessPool)
+            broken = broken or any(isinstance(one.exception(), BrokenProcessPool) for one in finished)
+            while finished:
+                future = finished.pop()
                 yield waiting.pop(future), future
     finally:
         for future in waiting:
@@ -116,7 +144,7 @@ def _bounded(
 
 
 class RayExecutor:
-    """On a Ray cluster: one task an item, lost tasks are run again by Ray."""
+    """On a Ray cluster, one task an item; Ray runs what a dead worker or node had again."""
 
     def __init__(self, address: str | None = None) -> None:
         """`address` of a cluster, or None to start one on this machine.
@@ -133,36 +161,83 @@ class RayExecutor:
         self._address = address
 
     def run(self, function: Callable[[T], R], items: Iterable[T], lost: Callable[[T, str], R]) -> Iterator[R]:
-        """The results, each as soon as it is there."""
+        """The results, each as soon as it is there.
+
+        Raises OutsideError when the cluster cannot be reached or is lost.
+        """
+
+        def answer(item: T) -> bytes:
+            # Plain bytes are copied out of the object store; an array would be a view that fills it up.
+            return pickle.dumps(function(item), pickle.HIGHEST_PROTOCOL)
+
         ray = self._ray
         ours = not ray.is_initialized()
         if ours:
+            self._connect()
+        waiting: dict[Any, T] = {}
+        try:
+            remote = ray.remote(max_retries=TRIES)(answer)
+            source = iter(items)
+            at_once, look_at_s = 0, 0.0
+            while True:
+                if time.monotonic() >= look_at_s:
+                    look_at_s = time.monotonic() + LOOK_EVERY_S
+                    # One at work and one at the door for each core: asking for the next takes a while.
+                    at_once = 2 * int(ray.cluster_resources().get("CPU", 0)) + AHEAD
+                for item in islice(source, max(0, at_once - len(waiting))):
+                    waiting[remote.remote(item)] = item
+                if not waiting:
+                    return
+                ray.wait(list(waiting))
+                ready, _ = ray.wait(list(waiting), num_returns=len(waiting), timeout=0)
+                while ready:
+                    reference = ready.pop()
+                    yield self._result(reference, waiting.pop(reference), lost)
+        finally:
+            if ours:
+                ray.shutdown()
+            else:
+                for reference in waiting:
+                    ray.cancel(reference, force=True)
+
+    def _connect(self) -> None:
+        ray = self._ray
+        named = re.fullmatch(r"(?:ray://)?\[?([^/]+?)\]?:(\d+)", self._address or "")
+        try:
+            if named:  # where nobody listens, Ray itself tries for minutes and then ends the process
+                socket.create_connection((named[1], int(named[2])), KNOCK_S).close()
             ray.init(
                 address=self._address,
                 log_to_driver=False,
                 logging_level="error",
                 include_dashboard=None if self._address else False,
             )
+        except (OSError, OverflowError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+            where = self._address or "this machine"
+            raise OutsideError(
+                f"found no usable Ray cluster at {where} ({str(error)[:200]}); expected one "
+                "with this Python and this Ray. Check --address, and `ray status` on its head node."
+            ) from error
+
+    def _result(self, reference: Any, item: T, lost: Callable[[T, str], R]) -> R:
+        failures = self._ray.exceptions
         try:
-            remote = ray.remote(max_retries=TRIES)(function)
-            slots = max(1, int(ray.cluster_resources().get("CPU", 1)))
-            source = iter(items)
-            waiting: dict[Any, T] = {}
-            while True:
-                while len(waiting) < slots + AHEAD and (item := next(source, None)) is not None:
-                    waiting[remote.remote(item)] = item
-                if not waiting:
-                    return
-                finished, _ = ray.wait(list(waiting), num_returns=1)
-                item = waiting.pop(finished[0])
-                try:
-                    result = ray.get(finished[0])
-                except ray.exceptions.WorkerCrashedError:
-                    result = lost(item, f"its worker died {TRIES + 1} times")
-                yield result
-        finally:
-            if ours:
-                ray.shutdown()
+            result: R = pickle.loads(self._ray.get(reference))  # noqa: S301 (our own worker's)
+        except failures.RayTaskError as error:
+            raise error.cause from None
+        except (
+            failures.WorkerCrashedError,
+            failures.NodeDiedError,
+            failures.OutOfMemoryError,
+            failures.ObjectLostError,
+        ) as error:
+            return lost(item, f"its worker or its node died {TRIES + 1} times ({type(error).__name__})")
+        except failures.RayError as error:
+            raise OutsideError(
+                f"Ray failed ({type(error).__name__}: {str(error).splitlines()[0][:200]}); expected one "
+                "that stays up. Run the command again: it goes on where it stopped."
+            ) from error
+        return result
 
 
 def default_workers() -> int:

@@ -173,10 +173,11 @@ def _process(job: Job, path: Path) -> dict[str, Sequence[Any]]:
     }
 
 
-def _read_part(part: Place, key: str) -> dict[str, Sequence[Any]] | None:
-    """The tables of a part made for `key`, or None."""
+def _read_part(part: Place, job: Job) -> dict[str, Sequence[Any]] | None:
+    """The tables of a part that was made from what `job` has now, or None."""
     try:
-        if metadata(io.BytesIO((part / "outcomes.parquet").read())).get("part_sha256") != key:
+        marked = metadata(io.BytesIO((part / "outcomes.parquet").read())).get("part_sha256")
+        if marked != part_sha256(job):
             return None
         files = {table: part / f"{table.name}.parquet" for table in RUN_TABLES}
         return {table.name: table.from_bytes(place.read(), str(place)) for table, place in files.items()}
@@ -259,18 +260,25 @@ def predict(
 
 def _runs(jobs: Sequence[Job], parts: Place, executor: Executor, only: Collection[str]) -> Iterator[VideoRun]:
     """The run of each job: from its part when that still holds, else from the executor."""
-    keys: dict[str, str] = {}
     todo = []
     for job in jobs:
-        key = keys[job.video_id] = part_sha256(job)
-        tables = None if job.video_id in only else _read_part(parts / job.video_id, key)
+        tables = None if job.video_id in only else _read_part(parts / job.video_id, job)
         if tables is not None:
             yield VideoRun(job.video_id, True, tables)
         elif only and job.video_id not in only:
             yield lost_video(job, NOT_RUN)
         else:
             todo.append(job)
-    for run in executor.run(run_video, todo, lost_video):
+    keys: dict[str, str] = {}
+
+    def drawn() -> Iterator[Job]:
+        # Most boxes first, so that no long clip is left over at the end; a clip is hashed when it is
+        # drawn, while others are at work: all clips of a large run are many gigabytes.
+        for job in sorted(todo, key=lambda job: -len(job.boxes)):
+            keys[job.video_id] = part_sha256(job)
+            yield job
+
+    for run in executor.run(run_video, drawn(), lost_video):
         if not run.outcome.error:
-            _write_part(parts / run.video_id, run.tables, keys[run.video_id])
+            _write_part(parts / run.video_id, run.tables, keys.pop(run.video_id))
         yield run

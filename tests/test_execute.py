@@ -5,13 +5,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from pipeline.execute import ProcessExecutor, RayExecutor, SerialExecutor, ThreadExecutor
+from pipeline.errors import Fault, FaultsError
+from pipeline.execute import AHEAD, ProcessExecutor, SerialExecutor, ThreadExecutor
 from pipeline.tables import OUTCOMES, PREDICTIONS, STAGES
 
 ROOT = Path(__file__).parent.parent
@@ -41,25 +42,6 @@ def lost(item: Any, why: str) -> int:
     return -1
 
 
-@pytest.fixture(scope="module")
-def ray_executor() -> Any:
-    """A Ray cluster of this machine's two cores, ours alone."""
-    import ray
-
-    # Its workers import this module.
-    environment = {"env_vars": {"PYTHONPATH": str(ROOT)}}
-    ray.init(
-        num_cpus=2,
-        include_dashboard=False,
-        log_to_driver=False,
-        logging_level="error",
-        runtime_env=environment,
-        object_store_memory=200 * 2**20,
-    )
-    yield RayExecutor()
-    ray.shutdown()
-
-
 @pytest.mark.parametrize("make", [SerialExecutor, lambda: ThreadExecutor(3), lambda: ProcessExecutor(2)])
 def test_every_item_comes_back_once(make: Callable[[], Any]) -> None:
     assert sorted(make().run(square, range(20), lost)) == [n * n for n in range(20)]
@@ -75,26 +57,78 @@ def test_an_item_that_always_kills_its_worker_is_given_up_alone() -> None:
     assert sorted(ProcessExecutor(2).run(die_always, range(6), lost)) == [-1, 0, 1, 2, 4, 5]
 
 
-def test_ray_runs_every_item_and_what_a_dead_worker_had(ray_executor: RayExecutor, tmp_path: Path) -> None:
-    assert sorted(ray_executor.run(square, range(20), lost)) == [n * n for n in range(20)]
-    jobs = [(tmp_path, number) for number in range(8)]
-    assert sorted(ray_executor.run(die_once, jobs, lost)) == list(range(8))
+def wait_long(number: int) -> None:
+    print(os.getpid(), flush=True)
+    time.sleep(600)
 
 
-def test_ray_writes_the_bytes_that_one_process_writes(ray_executor: RayExecutor, tmp_path: Path) -> None:
-    from pipeline.config import FrameSettings, RunConfig, Track2Settings
-    from pipeline.places import Place
-    from pipeline.run import RUN_TABLES, find_videos, predict
-    from pipeline.tables import BOXES
+RUN_FOR_EVER = """
+from pipeline.execute import ProcessExecutor
+from tests.test_execute import lost, wait_long
 
-    config = RunConfig(frames=FrameSettings(count=3), track2=Track2Settings(queries=2))
-    clips = find_videos(Place(str(ROOT / "demo" / "videos")))[:3]
-    boxes = BOXES.read(ROOT / "demo" / "boxes.parquet")
-    for name, executor in (("ray", ray_executor), ("serial", SerialExecutor())):
-        predict(clips, boxes, config, Place(str(tmp_path / name)), executor)
-    for table in RUN_TABLES:
-        one, other = (tmp_path / name / f"{table.name}.parquet" for name in ("ray", "serial"))
-        assert one.read_bytes() == other.read_bytes(), table.name
+if __name__ == "__main__":
+    list(ProcessExecutor(2).run(wait_long, range(2), lost))
+"""
+
+
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_however_a_run_ends_its_processes_end_with_it(by: signal.Signals, tmp_path: Path) -> None:
+    script = tmp_path / "for_ever.py"
+    script.write_text(RUN_FOR_EVER)
+    path = {**os.environ, "PYTHONPATH": str(ROOT)}
+    quiet: Any = {"env": path, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+    with subprocess.Popen([sys.executable, str(script)], start_new_session=True, **quiet) as run:
+        assert run.stdout is not None
+        for _ in range(2):
+            assert run.stdout.readline().strip().isdigit()  # both workers are at work
+        # As a terminal does: Ctrl-C goes to all of them.
+        (os.killpg if by is signal.SIGINT else os.kill)(run.pid, by)
+        # The pipe is at its end when no process holds it any more; it does not end by itself.
+        assert run.communicate(timeout=60)[0] == ""
+
+
+def fail(number: int) -> int:
+    if number == 3:
+        raise FaultsError([Fault("boxes.csv", 4, "width", "-1", "1 or more", "Correct it.")])
+    return number
+
+
+@pytest.mark.parametrize("make", [SerialExecutor, lambda: ThreadExecutor(2), lambda: ProcessExecutor(2)])
+def test_an_error_of_ours_arrives_as_it_was_raised(make: Callable[[], Any]) -> None:
+    with pytest.raises(FaultsError) as caught:
+        list(make().run(fail, range(6), lost))
+    assert str(caught.value).splitlines()[1].startswith("  boxes.csv, row 4, column width: found -1;")
+
+
+class Counted:
+    """Items that know how many of them were drawn."""
+
+    def __init__(self, count: int) -> None:
+        self.drawn = 0
+        self._count = count
+
+    def __iter__(self) -> Iterator[int]:
+        for number in range(self._count):
+            self.drawn += 1
+            yield number
+
+
+def most_in_flight(results: Iterator[int], items: Counted) -> tuple[list[int], int]:
+    """The results, and how many items were at most drawn whose result had not been taken."""
+    found: list[int] = []
+    most = 0
+    for result in results:
+        most = max(most, items.drawn - len(found))
+        found.append(result)
+    return found, most
+
+
+@pytest.mark.parametrize("make", [lambda: ThreadExecutor(2), lambda: ProcessExecutor(2)])
+def test_few_items_are_drawn_before_their_time(make: Callable[[], Any]) -> None:
+    items = Counted(2_000)
+    found, most = most_in_flight(make().run(square, items, lost), items)
+    assert sorted(found) == [number**2 for number in range(2_000)]
+    assert most <= 2 + AHEAD
 
 
 def test_killed_at_any_moment_nothing_is_lost_and_nothing_twice(tmp_path: Path) -> None:
