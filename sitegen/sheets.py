@@ -18,6 +18,8 @@ from sitegen.texts import RepeatedKeys, csv_rows, json_record, limit_rows
 
 MAX_UNPACKED_BYTES = 4 * 2**30
 MAX_LIST_BYTES = 2**30
+LIST_ROWS = 4_096
+"""How many rows' lists are unpacked before their bytes are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +127,7 @@ def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
         strings = [leaf.path for leaf in leaves if leaf.physical_type == "BYTE_ARRAY"]
         with pq.ParquetFile(pa.BufferReader(data), read_dictionary=strings) as file:
             names = file.schema_arrow.names
-            marks = {_text(key): _text(value) for key, value in (file.schema_arrow.metadata or {}).items()}
+            marks = marks_of(file.schema_arrow)
             for name in sorted({name for name in known if names.count(name) > 1}):
                 faults.stop(f"{names.count(name)} columns `{name}`", "one", "Remove or rename one.")
             lists = {leaf.path.split(".")[0] for leaf in leaves if leaf.max_repetition_level > 0}
@@ -140,8 +142,10 @@ def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
     return Sheet(tuple(names), range(1, metadata.num_rows + 1), cells, marks)
 
 
-def _text(mark: bytes) -> str:
-    return mark.decode("utf-8", "replace")
+def marks_of(schema: pa.Schema) -> dict[str, str]:
+    """A Parquet file's text marks."""
+    marks = (schema.metadata or {}).items()
+    return {key.decode("utf-8", "replace"): value.decode("utf-8", "replace") for key, value in marks}
 
 
 def _parquet_bounds(metadata: pq.FileMetaData, faults: Faults) -> None:
@@ -158,7 +162,7 @@ def _lists(file: pq.ParquetFile, name: str, faults: Faults) -> list[Any]:
     """A column of lists, read in parts, since few bytes of a file can hold very many items."""
     values: list[Any] = []
     unpacked = 0
-    for batch in file.iter_batches(batch_size=4_096, columns=[name]):
+    for batch in file.iter_batches(batch_size=LIST_ROWS, columns=[name]):
         unpacked += batch.nbytes
         if unpacked > MAX_LIST_BYTES:
             found = f"lists of more than {MAX_LIST_BYTES // 2**20} MB in `{name}`"
