@@ -76,7 +76,7 @@ def accepted(raw: RawColumns, known: set[str] | None, video_map: Mapping[str, st
 
 
 def _csv(data: bytes, known: Sequence[str]) -> RawColumns | None:
-    found = csv_table(data, list(known))
+    found = csv_table(data, known)
     if found is None:
         return None
     header, table = found
@@ -155,7 +155,7 @@ def _videos(
     column: pa.ChunkedArray, known: set[str] | None, video_map: Mapping[str, str]
 ) -> tuple[Coded, VideoIds, bool]:
     """The videos, sorted, with the number of each row's."""
-    codes, values = _distinct(column)
+    codes, values = distinct(column)
     met = pa.array(codes).dictionary_encode().dictionary.to_pylist()  # in the order of the file
     ids = VideoIds(known, video_map, [values[code] for code in met])
     video_of = {code: ids(values[code]) for code in met}
@@ -171,7 +171,7 @@ def _videos(
 def _ranks(column: pa.ChunkedArray) -> Codes:
     if pa.types.is_integer(column.type):
         return _integers(column, 1)
-    codes, values = _distinct(column)
+    codes, values = distinct(column)
     used = np.bincount(codes, minlength=len(values)) > 0
     ranks = [checks.whole(value, 1) if is_used else 0 for value, is_used in zip(values, used, strict=True)]
     return np.array(ranks, dtype=np.int32)[codes]
@@ -207,7 +207,7 @@ def _texts(
     column: pa.ChunkedArray, check: Callable[[Any], Any], kind: pa.DataType = LABEL
 ) -> tuple[Coded, bool]:
     """A column by its distinct values, each checked once; and whether the check left all as they were."""
-    codes, values = _distinct(column)
+    codes, values = distinct(column)
     used = np.bincount(codes, minlength=len(values)) > 0
     number: dict[Any, int] = {}
     new = np.zeros(len(values), dtype=np.int32)
@@ -240,13 +240,13 @@ def _items(column: pa.ChunkedArray, name: str) -> tuple[Coded, bool]:
     return Coded(np.arange(len(lists), dtype=np.int32), lists), is_same
 
 
-def _distinct(column: pa.ChunkedArray) -> tuple[Codes, list[Any]]:
+def distinct(column: pa.ChunkedArray) -> tuple[Codes, list[Any]]:
     """A column as places in a list of its distinct values, which may also hold some that it has not.
 
     Raises DoubtError for other values than texts and numbers, ValueError for text that is not UTF-8.
     """
     kind = column.type
-    if pa.types.is_null(kind):
+    if pa.types.is_null(kind):  # also a column of empty cells in a CSV
         return np.zeros(len(column), dtype=np.int32), [None]
     if not pa.types.is_dictionary(kind):
         column = column.dictionary_encode()

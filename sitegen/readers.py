@@ -20,6 +20,7 @@ from sitegen.cells import BAD, clean_column, missing_columns, note_repeats, unkn
 from sitegen.checks import Faults, visible
 from sitegen.columns import COLUMNAR, accepted, raw_columns
 from sitegen.coool import coool, twocoool
+from sitegen.coool_columns import coool_predictions
 from sitegen.formats import NAMES, TABLES, ending_of, format_of, prediction_format_of, refuse_other_kind
 from sitegen.outside import coco, scripts
 from sitegen.sheets import Sheet, sheet_of
@@ -121,6 +122,9 @@ class _Found:
 
 def by_column(data: bytes, source_format: str, known: set[str] | None, options: ReadOptions) -> _Found | None:
     """What a file without any fault holds, read column by column; None when in doubt (see columns.py)."""
+    if source_format == "coool":
+        captions = coool_predictions(data, known, options.video_map)
+        return captions and _Found(captions[0].predictions, captions[0].ids, captions[1])
     raw = raw_columns(data, source_format, PREDICTION_COLUMNS) if source_format in COLUMNAR else None
     found = None if raw is None else accepted(raw, known, options.video_map)
     if raw is None or found is None:

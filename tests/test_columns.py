@@ -216,3 +216,48 @@ def test_usual_files_need_no_look_at_their_cells(name: str) -> None:
 def test_lists_of_more_bytes_than_may_be_are_left_to_the_cells(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sheets, "MAX_LIST_BYTES", 1)
     assert by_column(usual("parquet"), "parquet", None, ReadOptions()) is None
+
+
+CAPTIONS = ["", "A cat", "a dog, running", " A cat ", "nan", 'a "red" car', "  "]
+TRACK_IDS = ["", "7", "7.0", " 7", "9", "é", "x" * 129]
+
+
+@st.composite
+def coool_files(draw: st.DrawFn) -> bytes:
+    """COOOL results, in half of the files without a fault."""
+    is_hostile = draw(st.booleans())
+    first, slots = draw(st.sampled_from([0, 1])), draw(st.integers(1, 3))
+    header = ["ID", "driver_state_changed"]
+    for slot in range(first, first + slots):
+        header += [f"Hazard_Track_{slot}", f"Hazard_Name_{slot}"]
+    ids = ["v1_0", "v1_1", "v1_10", "v2_0", "v2_2", "clip_07_4", "7_1"]
+    odd = ["v1_00", "v1_x", "v1", "_3", "v1_99999999999", " v2_7 ", "v1 _3", "../x_1"]
+    kept = draw(st.lists(st.sampled_from(ids + (odd if is_hostile else [])), unique=True, max_size=6))
+    captions, tracks = (CAPTIONS, TRACK_IDS) if is_hostile else (CAPTIONS[:4], TRACK_IDS[:5])
+    sink = io.StringIO(newline="")
+    writer = csv.writer(sink, lineterminator=draw(st.sampled_from(["\n", "\r\n"])))
+    extra = [""] * draw(st.sampled_from([0, 0, 2]))
+    writer.writerow(header + extra)
+    for frame in kept:
+        cells = [draw(st.sampled_from(part)) for _ in range(slots) for part in (tracks, captions)]
+        short = draw(st.integers(0, 9)) == 0 if is_hostile else False
+        writer.writerow([frame, "True", *cells, *extra][: -1 if short else None])
+    return sink.getvalue().encode()
+
+
+@settings(max_examples=400)
+@given(data=coool_files(), known=TRUTHS, options=OPTIONS)
+def test_coool(data: bytes, known: set[str] | None, options: ReadOptions) -> None:
+    hold(data, "coool", known, options)
+
+
+def test_usual_coool_results_need_no_look_at_their_rows() -> None:
+    rows = ["v2_1,False,7,a dog,,", "v2_0,True,7,a dog,9,A cat", "v1_3,True,,A cat,8,", "v2_5,True,9,A cat,,"]
+    header = "ID,Driver_State_Changed,Hazard_Track_1,Hazard_Name_1,Hazard_Track_2,Hazard_Name_2"
+    found = by_column("\n".join([header, *rows]).encode(), "coool", {"v1", "v2"}, ReadOptions())
+    assert found is not None and found.predictions == (
+        Prediction("v1", 1, "A cat", None, (), (3,)),
+        Prediction("v2", 1, "a dog", None, ("7",), (0, 1)),
+        Prediction("v2", 2, "A cat", None, ("9",), (0, 5)),
+    )
+    assert found.warnings == ["1 track in a frame has no caption and thus no prediction."]
