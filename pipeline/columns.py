@@ -72,7 +72,10 @@ class Columns(Sequence[R], Generic[R]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coded:
-    """A column of P values as numbers: `codes` (P,) are places in `values`, texts or lists, which repeat."""
+    """A column of P values as numbers: `codes` (P,) are places in `values`, texts or lists.
+
+    Texts are distinct, and each is used; lists may be equal, or not used.
+    """
 
     codes: NDArray[np.int32]
     values: pa.Array
@@ -83,6 +86,11 @@ class Coded:
         number: dict[object, int] = {}
         codes = np.fromiter((number.setdefault(value, len(number)) for value in values), dtype=np.int32)
         return cls(codes, pa.array(list(number), kind))
+
+    @classmethod
+    def same(cls, value: object, count: int, kind: pa.DataType) -> Self:
+        """One value `count` times."""
+        return cls(np.zeros(count, dtype=np.int32), pa.array([value] if count else [], kind))
 
     def ordered(self, order: NDArray[np.int64]) -> Self:
         """The same values in another order."""

@@ -51,6 +51,11 @@ class Predictions(Columns[Prediction]):
         """The videos that have predictions, sorted."""
         return list(self.video.values.to_pylist())
 
+    @property
+    def texts(self) -> list[str]:
+        """The distinct descriptions, by the codes of `description`."""
+        return list(self.description.values.to_pylist())
+
     def __len__(self) -> int:
         """P."""
         return len(self.rank)

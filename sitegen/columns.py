@@ -194,7 +194,7 @@ def _optional(
     """A column that may be missing, in whole or in single cells, and whether all of it stayed as it was."""
     column = raw.arrays.get(name)
     if column is None:
-        return Coded(np.zeros(raw.rows, dtype=np.int32), pa.array([missing], kind)), True
+        return Coded.same(missing, raw.rows, kind), True
     if pa.types.is_list(column.type) or pa.types.is_large_list(column.type):
         if not pa.types.is_list(kind):
             raise DoubtError
@@ -254,6 +254,10 @@ def distinct(column: pa.ChunkedArray) -> tuple[Codes, list[Any]]:
     is_number = pa.types.is_integer(inner) or pa.types.is_float64(inner) or pa.types.is_float32(inner)
     if not (is_number or pa.types.is_string(inner) or pa.types.is_large_string(inner)):
         raise DoubtError
+    for chunk in column.chunks:  # a damaged file's places may lie outside, which nothing below looks at
+        places = pc.min_max(chunk.indices).as_py()
+        if places["min"] is not None and not 0 <= places["min"] <= places["max"] < len(chunk.dictionary):
+            raise DoubtError
     array = column.unify_dictionaries().combine_chunks()
     values = [*array.dictionary.to_pylist(), None]
     codes = array.indices.fill_null(len(values) - 1) if array.null_count else array.indices

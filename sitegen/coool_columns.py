@@ -180,7 +180,7 @@ def _predictions(frames: _Frames, slots: _Slots, video_ids: list[str]) -> Predic
         Coded(videos.astype(np.int32), pa.array([video_ids[place] for place in said], pa.string())),
         (np.arange(len(videos)) - begin + 1).astype(np.int32),
         Coded((slots.name[first] - 1).astype(np.int32), pa.array(slots.names[1:], pa.string())),
-        Coded(np.zeros(len(videos), dtype=np.int32), pa.array([None], LABEL)),
+        Coded.same(None, len(videos), LABEL),
         Coded(
             slots.track[first].astype(np.int32), pa.array([[t] if t else [] for t in slots.tracks], TRACKS)
         ),

@@ -56,6 +56,7 @@ FLOORS = [
         "pipeline.data.watermark",
         "pipeline.local_llm",
         "pipeline.metering",
+        "pipeline.pairs",
         "pipeline.parsing",
         "pipeline.prompts",
         "pipeline.recording_zip",
