@@ -62,8 +62,8 @@ def submit_file(
 
 
 def predictions_of(file: Path) -> Path:
-    """The predictions file meant by a file, or by the folder of a run."""
-    return file / "predictions.parquet" if file.is_dir() else file
+    """The predictions file of a run folder; any other file, or folder of shards, is meant itself."""
+    return file / "predictions.parquet" if (file / "predictions.parquet").is_file() else file
 
 
 def extras_of(file: Path) -> dict[str, Path]:
@@ -76,7 +76,7 @@ def extras_of(file: Path) -> dict[str, Path]:
 
 def with_agents(sender: Sender, file: Path) -> Sender:
     """The sender, with the agents that a run folder names, unless the sender named some."""
-    if sender.agents or not file.is_dir():
+    if sender.agents or predictions_of(file) == file:
         return sender
     return replaced(sender, agents=metadata(predictions_of(file)).get("agents", ""))
 

@@ -75,5 +75,5 @@ def note_repeats(sheet: Sheet, videos: list[Any], numbers: list[Any], column: st
         before = first_row.setdefault(key, row)
         if before != row and BAD not in key and key[1] != "":
             again = f"{column} '{visible(str(key[1]))}' again"
-            found = f"{again} in video '{visible(key[0])}' (first in row {before})"
+            found = f"{again} in video '{visible(key[0])}' (first in {faults.place(before)})"
             faults.add(row, column, found, f"each {column} once in a video", "Renumber or remove the row.")

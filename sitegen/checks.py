@@ -45,12 +45,21 @@ class Faults:
     """Collects the faults of one file: of each column 1,000 in detail, of the rest the count.
 
     `line_of` gives the line of a row in a text file; it is asked only for the faults that are told.
+    `source_of` gives the file and the row there, where rows are counted over several files.
     """
 
     file: str
     kept: dict[str | None, list[Fault]] = field(default_factory=dict)
     more: int = 0
     line_of: Callable[[int], int | None] | None = None
+    source_of: Callable[[int], tuple[str, int]] | None = None
+
+    def place(self, row: int) -> str:
+        """A row, as another row's fault tells of it."""
+        if self.source_of is None:
+            return f"row {row}"
+        file, number = self.source_of(row)
+        return f"row {number} of {file}"
 
     def add(
         self,
@@ -91,6 +100,9 @@ class Faults:
         return FaultsError(faults)
 
     def _with_line(self, fault: Fault) -> Fault:
+        if self.source_of is not None and fault.row is not None:
+            file, row = self.source_of(fault.row)
+            return replace(fault, file=file, row=row)
         if self.line_of is None or fault.row is None or fault.line is not None:
             return fault
         return replace(fault, line=self.line_of(fault.row))

@@ -18,11 +18,12 @@ from sitegen import checks
 from sitegen.captions import Captions, checked, some
 from sitegen.cells import BAD, clean_column, missing_columns, note_repeats, unknown_columns
 from sitegen.checks import Faults, visible
-from sitegen.columns import COLUMNAR, accepted, raw_columns
+from sitegen.columns import COLUMNAR, RawColumns, accepted, raw_columns
 from sitegen.coool import coool, twocoool
 from sitegen.coool_columns import coool_predictions
 from sitegen.formats import NAMES, TABLES, ending_of, format_of, prediction_format_of, refuse_other_kind
 from sitegen.outside import coco, scripts
+from sitegen.shards import read_shards, shards_columns, shards_sheet
 from sitegen.sheets import Sheet, sheet_of
 from sitegen.texts import limit_rows
 from sitegen.unpack import Content, content_of
@@ -91,23 +92,57 @@ def read_predictions(
     content = content_of(path, faults)
     source_format = choose_format(content, options, faults)
     hazards = None if truth is None else list(truth)
-    known = None if hazards is None else {hazard.video_id for hazard in hazards}
+    known = _known(hazards)
     found = by_column(content.data, source_format, known, options)
     if found is None:
         found = by_cell(content.data, source_format, known, options, faults)
+    ending = ending_of(source_format)
+    ending = f"{ending}.{content.packing}" if content.packing else ending
+    return _read(found, source_format, content.sha256, ending, hazards)
+
+
+def read_sharded(
+    folder: Path, truth: Iterable[TruthHazard] | None = None, options: ReadOptions | None = None
+) -> ReadPredictions:
+    """The predictions in a folder of Parquet shards, as `read_predictions` gives those of one file.
+
+    `sha256` is over the shards' names and bytes (see `read_shards`). Raises FaultsError, whose faults name
+    the shard and its row.
+    """
+    options = options or ReadOptions()
+    faults = Faults(visible(str(folder), 1_000))
+    if options.source_format not in ("", "parquet") or options.caption_column:
+        faults.stop("a folder", "one file of the format that was asked for", "Give the file itself.")
+    shards = read_shards(folder, faults)
+    hazards = None if truth is None else list(truth)
+    known = _known(hazards)
+    raw = shards_columns(shards, PREDICTION_COLUMNS)
+    found = None if raw is None else _of_columns(raw, known, options)
+    if found is None:
+        found = _of_cells(shards_sheet(shards, PREDICTION_COLUMNS, faults), known, options, faults)
+    return _read(found, "parquet", shards.sha256, "parquet", hazards)
+
+
+def read_given(
+    path: Path, truth: Iterable[TruthHazard] | None = None, options: ReadOptions | None = None
+) -> ReadPredictions:
+    """The predictions in a file or in a folder of shards; raises as `read_predictions` does."""
+    return (read_sharded if path.is_dir() else read_predictions)(path, truth, options)
+
+
+def _known(hazards: Sequence[TruthHazard] | None) -> set[str] | None:
+    return None if hazards is None else {hazard.video_id for hazard in hazards}
+
+
+def _read(
+    found: "_Found", source_format: str, sha256: str, ending: str, hazards: Sequence[TruthHazard] | None
+) -> ReadPredictions:
     warnings = [*found.warnings, *found.ids.warnings()]
     if not found.predictions:
         warnings.append("The file holds no prediction.")
     warnings += _missing_videos(found.predictions, hazards or ())
-    ending = ending_of(source_format)
-    return ReadPredictions(
-        found.predictions,
-        source_format,
-        content.sha256,
-        tuple(warnings),
-        found.config if _SHA256.fullmatch(found.config) else "",
-        f"{ending}.{content.packing}" if content.packing else ending,
-    )
+    config = found.config if _SHA256.fullmatch(found.config) else ""
+    return ReadPredictions(found.predictions, source_format, sha256, tuple(warnings), config, ending)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +161,12 @@ def by_column(data: bytes, source_format: str, known: set[str] | None, options: 
         captions = coool_predictions(data, known, options.video_map)
         return captions and _Found(captions[0].predictions, captions[0].ids, captions[1])
     raw = raw_columns(data, source_format, PREDICTION_COLUMNS) if source_format in COLUMNAR else None
-    found = None if raw is None else accepted(raw, known, options.video_map)
-    if raw is None or found is None:
+    return None if raw is None else _of_columns(raw, known, options)
+
+
+def _of_columns(raw: RawColumns, known: set[str] | None, options: ReadOptions) -> _Found | None:
+    found = accepted(raw, known, options.video_map)
+    if found is None:
         return None
     warnings = unknown_columns(raw.names, PREDICTION_COLUMNS)
     return _Found(found.predictions, found.ids, warnings, raw.metadata.get("config_sha256", ""))
@@ -139,14 +178,18 @@ def by_cell(
     """What a file holds, read cell by cell. Raises FaultsError with every fault."""
     if source_format in TABLES:
         sheet = sheet_of(data, source_format, PREDICTION_COLUMNS, faults)
-        ids = VideoIds(known, options.video_map, sheet.cells.get("video_id", ()))
-        predictions = Predictions.of(_of_sheet(sheet, ids, faults))
-        warnings = unknown_columns(sheet.columns, PREDICTION_COLUMNS)
-        return _Found(predictions, ids, warnings, sheet.metadata.get("config_sha256", ""))
+        return _of_cells(sheet, known, options, faults)
     captions = _captions(data, source_format, options, faults)
     ids = VideoIds(known, options.video_map, captions.rows)
     predictions = Predictions.of(_of_captions(captions, ids, faults))
     return _Found(predictions, ids, captions.warnings)
+
+
+def _of_cells(sheet: Sheet, known: set[str] | None, options: ReadOptions, faults: Faults) -> _Found:
+    ids = VideoIds(known, options.video_map, sheet.cells.get("video_id", ()))
+    predictions = Predictions.of(_of_sheet(sheet, ids, faults))
+    warnings = unknown_columns(sheet.columns, PREDICTION_COLUMNS)
+    return _Found(predictions, ids, warnings, sheet.metadata.get("config_sha256", ""))
 
 
 def choose_format(content: Content, options: ReadOptions, faults: Faults) -> str:

@@ -150,12 +150,23 @@ def marks_of(schema: pa.Schema) -> dict[str, str]:
 
 def _parquet_bounds(metadata: pq.FileMetaData, faults: Faults) -> None:
     limit_rows(metadata.num_rows, faults)
-    # A row group's columns are not asked: pyarrow aborts the process where a damaged file has none.
-    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
-    unpacked = sum(group.total_byte_size for group in groups)
+    unpacked = _unpacked_bytes(metadata)
     if unpacked > MAX_UNPACKED_BYTES:
         expected = f"at most {MAX_UNPACKED_BYTES:,} bytes"
         faults.stop(f"{unpacked:,} bytes, unpacked", expected, "Leave out columns or predictions.")
+
+
+def unpacked_bytes(data: bytes) -> int:
+    """What a Parquet file's footer says its pages unpack to; 0 when it cannot be read."""
+    try:
+        return _unpacked_bytes(pq.read_metadata(pa.BufferReader(data)))
+    except (pa.ArrowException, OSError, ValueError, IndexError, MemoryError):
+        return 0
+
+
+def _unpacked_bytes(metadata: pq.FileMetaData) -> int:
+    # A row group's columns are not asked: pyarrow aborts the process where a damaged file has none.
+    return sum(metadata.row_group(place).total_byte_size for place in range(metadata.num_row_groups))
 
 
 def _lists(file: pq.ParquetFile, name: str, faults: Faults) -> list[Any]:

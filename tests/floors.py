@@ -187,6 +187,7 @@ FLOORS = [
         "sitegen.coool_score",
         "sitegen.data_check_run",
         "sitegen.gathered",
+        "sitegen.shards",
         "sitegen.submission_contexts",
         "sitegen.video_contexts",
     ],
