@@ -216,7 +216,9 @@ def _texts(
         clean = check(values[code])
         is_same &= clean == values[code]
         new[code] = number.setdefault(clean, len(number))
-    return Coded(new[codes], pa.array(list(number), kind)), is_same
+    if not np.array_equal(new[used], np.flatnonzero(used)):
+        codes = new[codes]
+    return Coded(codes, pa.array(list(number), kind)), is_same
 
 
 def _items(column: pa.ChunkedArray, name: str) -> tuple[Coded, bool]:
