@@ -1,5 +1,6 @@
 """Submissions and their scores: frozen, similarities in [0, 1], ranks from 1."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.records import Prediction
@@ -7,14 +8,17 @@ from pipeline.records import Prediction
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """Predictions of one system, with who sent them; `date` is ISO 8601, `url` may be empty."""
+    """Predictions of one system, with who sent them; `date` is ISO 8601, `url` may be empty.
+
+    `predictions` is a tuple, or `Predictions`: columns that equal the tuple of their rows.
+    """
 
     name: str
     authors: str
     url: str
     date: str
     source_format: str
-    predictions: tuple[Prediction, ...]
+    predictions: Sequence[Prediction]
     warnings: tuple[str, ...] = ()
 
 
@@ -93,6 +97,6 @@ class Evaluation:
     """A submission with all its scores: `videos` holds every truth video, sorted by id."""
 
     submission: Submission
-    pairs: tuple[PairScore, ...]
+    pairs: Sequence[PairScore]
     videos: tuple[VideoScore, ...]
     card: Scorecard

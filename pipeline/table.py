@@ -4,7 +4,7 @@ Sorting makes the bytes a function of the rows alone, whatever order they came i
 """
 
 import io
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -12,10 +12,13 @@ from typing import Any, Generic, TypeAlias, TypeVar
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipeline.columns import Columns
 from pipeline.errors import Fault, FaultsError
-from pipeline.files import write_bytes
+from pipeline.files import replacing
 
 SCHEMA_VERSION = "1"
+ROW_GROUP = 2**17
+"""Rows of a row group: what is held in memory at once when columns are written."""
 
 R = TypeVar("R")
 Row: TypeAlias = dict[str, Any]
@@ -33,21 +36,39 @@ class Table(Generic[R]):
 
     def to_arrow(self, records: Iterable[R]) -> pa.Table:
         """The records, sorted by key, as an Arrow table of this schema."""
-        rows = [self.to_row(record) for record in sorted(records, key=self.key)]
-        return pa.Table.from_pylist(rows, schema=self.schema)
+        return pa.Table.from_batches(self._batches(records), self.schema)
 
     def to_bytes(self, records: Iterable[R], metadata: Mapping[str, str] | None = None) -> bytes:
         """The records, sorted by key, as the content of a Parquet file."""
-        table = self.to_arrow(records)
-        marks = {"schema_version": SCHEMA_VERSION, "table": self.name, **(metadata or {})}
-        table = table.replace_schema_metadata({key: marks[key] for key in sorted(marks)})
         sink = io.BytesIO()
-        pq.write_table(table, sink, compression="zstd", compression_level=3)
+        self._write(sink, records, metadata)
         return sink.getvalue()
 
     def write(self, path: Path, records: Iterable[R], metadata: Mapping[str, str] | None = None) -> None:
         """Write the records, sorted by key, whole or not at all."""
-        write_bytes(path, self.to_bytes(records, metadata))
+        with replacing(path) as temporary:
+            self._write(temporary, records, metadata)
+
+    def _write(
+        self, sink: Path | io.BytesIO, records: Iterable[R], metadata: Mapping[str, str] | None
+    ) -> None:
+        marks = {"schema_version": SCHEMA_VERSION, "table": self.name, **(metadata or {})}
+        schema = self.schema.with_metadata({key: marks[key] for key in sorted(marks)})
+        with pq.ParquetWriter(sink, schema, compression="zstd", compression_level=3) as writer:
+            for batch in self._batches(records):
+                writer.write_table(pa.Table.from_batches([batch]).cast(schema))
+
+    def _batches(self, records: Iterable[R]) -> Iterator[pa.RecordBatch]:
+        """The records, sorted by key, a row group at a time; at least one. Columns are sorted already."""
+        if isinstance(records, Columns):
+            for start in range(0, len(records) or 1, ROW_GROUP):
+                arrays = records.arrays(start, min(start + ROW_GROUP, len(records)))
+                yield pa.RecordBatch.from_arrays(arrays, schema=self.schema)
+            return
+        kept = sorted(records, key=self.key)
+        for start in range(0, len(kept) or 1, ROW_GROUP):
+            rows = [self.to_row(record) for record in kept[start : start + ROW_GROUP]]
+            yield pa.RecordBatch.from_pylist(rows, schema=self.schema)
 
     def read(self, path: Path) -> list[R]:
         """Read the records of a file that `write` made.

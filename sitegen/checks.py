@@ -45,12 +45,21 @@ class Faults:
     """Collects the faults of one file: of each column 1,000 in detail, of the rest the count.
 
     `line_of` gives the line of a row in a text file; it is asked only for the faults that are told.
+    `source_of` gives the file and the row there, where rows are counted over several files.
     """
 
     file: str
     kept: dict[str | None, list[Fault]] = field(default_factory=dict)
     more: int = 0
     line_of: Callable[[int], int | None] | None = None
+    source_of: Callable[[int], tuple[str, int]] | None = None
+
+    def place(self, row: int) -> str:
+        """A row, as another row's fault tells of it."""
+        if self.source_of is None:
+            return f"row {row}"
+        file, number = self.source_of(row)
+        return f"row {number} of {file}"
 
     def add(
         self,
@@ -91,6 +100,9 @@ class Faults:
         return FaultsError(faults)
 
     def _with_line(self, fault: Fault) -> Fault:
+        if self.source_of is not None and fault.row is not None:
+            file, row = self.source_of(fault.row)
+            return replace(fault, file=file, row=row)
         if self.line_of is None or fault.row is None or fault.line is not None:
             return fault
         return replace(fault, line=self.line_of(fault.row))
@@ -142,7 +154,8 @@ def text(value: object, expected: str = "text") -> str:
             found = f"{broken[:8]!r}, which is not UTF-8, in {show(value)}"
             raise Wrong(found, "text in UTF-8", "Save the file as UTF-8.") from None
     stripped = value.strip()
-    if not any(char.isprintable() and not char.isspace() for char in stripped):
+    is_plain = bool(stripped) and stripped.isprintable()  # what most are, told at once
+    if not is_plain and not any(char.isprintable() and not char.isspace() for char in stripped):
         raise Wrong(show(value), expected, "Fill it in, or leave the row out.")
     if len(stripped) > MAX_TEXT_CHARS:
         raise Wrong(show(value), f"at most {MAX_TEXT_CHARS:,} characters", SHORTEN)

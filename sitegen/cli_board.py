@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 
 def submit(
+    context: typer.Context,
     file: FileArgument,
     name: Annotated[str, typer.Option(help="Name on the leaderboard, at most 80 characters.")] = "",
     authors: Annotated[str, typer.Option(help="Who made it.")] = "",
@@ -82,6 +83,8 @@ def submit(
     sender = _sender({**given, "date": date}, about)
     options = options_of(source_format, caption_column, video_map)
     path, read = _read(benchmark, file, options, markdown, sender.name)
+    if path.is_dir():
+        path, read = _as_one_file(read, context)
     sender = with_agents(sender, file)
     if rehearse:
         _rehearse(benchmark, path, read, sender, preview, markdown, as_json)
@@ -143,6 +146,19 @@ def _read(
         if markdown:
             write_text(markdown, faults_markdown(name, error.faults))
         raise
+
+
+def _as_one_file(read: "ReadPredictions", context: typer.Context) -> "tuple[Path, ReadPredictions]":
+    """What shards hold as the one file that is stored, kept while the command runs."""
+    from dataclasses import replace
+    from tempfile import TemporaryDirectory
+
+    from pipeline.files import sha256_file
+    from pipeline.tables import PREDICTIONS
+
+    path = Path(context.with_resource(TemporaryDirectory())) / "predictions.parquet"
+    PREDICTIONS.write(path, read.predictions)
+    return path, replace(read, sha256=sha256_file(path))
 
 
 def _rehearse(

@@ -66,14 +66,14 @@ def read_file(
 ) -> "tuple[Path, ReadPredictions]":
     """The predictions file meant by `file`, and what it holds.
 
-    A Parquet file is read in a process of its own: a damaged one can end the process that reads it.
+    Parquet is read in a process of its own: a damaged file can end the process that reads it.
     """
     from sitegen.readers import read_predictions
     from sitegen.run_folder import predictions_of
     from sitegen.sandbox import read_apart
 
     path = predictions_of(file)
-    apart = _holds_parquet(path)
+    apart = path.is_dir() or _holds_parquet(path)
     return path, read_apart(path, truth, options) if apart else read_predictions(path, truth, options)
 
 

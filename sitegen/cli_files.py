@@ -50,6 +50,7 @@ def check(
 ) -> None:
     """Check a predictions file against the truth: every fault at once."""
     from pipeline.errors import FaultsError
+    from pipeline.predictions import Predictions
     from sitegen.readers import read_truth
 
     options = options_of(source_format, caption_column, video_map)
@@ -66,7 +67,7 @@ def check(
             console.stderr().print(f"fixed: {note}", markup=False)
         raise
     videos = len({hazard.video_id for hazard in hazards})
-    covered = len({prediction.video_id for prediction in read.predictions})
+    covered = len(Predictions.of(read.predictions).video_ids)
     if as_json:
         console.print_json(
             {

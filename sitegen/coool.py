@@ -101,18 +101,22 @@ def coool(data: bytes, faults: Faults) -> Captions:
             seen.frames.add(read.frame)
     for video, of_video in videos.items():
         captions.predictions += _ranked(video, of_video, faults)
-    if untold:
-        places = counted(untold, "track in a frame has", "tracks in frames have")
-        captions.warnings.append(f"{places} no caption and thus no prediction.")
+    captions.warnings += untold_warnings(untold)
     return captions
+
+
+def untold_warnings(untold: int) -> list[str]:
+    """What is said of the `untold` slots with a track alone; nothing when there are none."""
+    places = counted(untold, "track in a frame has", "tracks in frames have")
+    return [f"{places} no caption and thus no prediction."] if untold else []
 
 
 def frame_rows(data: bytes, faults: Faults) -> Iterator[FrameRow]:
     """The rows of COOOL results, those with a fault in their ID left out; what is wrong goes to `faults`."""
     places: dict[str, dict[int, int]] = {}
-    tracks, names = _Cells(_track, faults), _Cells(checks.description, faults)
+    tracks, names = _Cells(track_id, faults), _Cells(checks.description, faults)
     with csv_rows(data, faults, spaced=True) as rows:
-        header = _slots(next(rows, []), faults)
+        header = header_of(next(rows, []), faults)
         for row, cells in enumerate(rows, start=1):
             limit_rows(row, faults)
             place = _frame(cells[0], row, places, faults)
@@ -151,8 +155,11 @@ def _filled(
     return tuple(found)
 
 
-def _slots(header: Sequence[str], faults: Faults) -> list[str]:
-    """The header's names, without empty cells at the end; slots count from 0 or 1."""
+def header_of(header: Sequence[str], faults: Faults) -> list[str]:
+    """The header's names, without empty cells at the end; slots count from 0 or 1.
+
+    Raises FaultsError for other columns than the challenge's.
+    """
     names = [name.strip() for name in header]
     while names and not names[-1]:
         names.pop()
@@ -175,13 +182,12 @@ def _frame(
     cell: str, row: int, frame_rows: dict[str, dict[int, int]], faults: Faults
 ) -> tuple[str, int] | None:
     """Video and frame of an ID such as `video_0001_0`, or None after its fault is noted."""
-    found = _ID.fullmatch(cell.strip())
-    frame = int(found[2]) if found else -1
-    if not found or frame > MAX_WHOLE:
+    found = frame_of(cell)
+    if found is None:
         mend = "Write the video's id, '_', and the frame's number from 0."
         faults.add(row, "ID", show(cell), "an ID such as 'video_0001_0'", mend)
         return None
-    video = found[1]
+    video, frame = found
     before = frame_rows.setdefault(video, {}).setdefault(frame, row)
     if before != row:
         again = f"frame {frame} of video '{visible(video)}' again (first in row {before})"
@@ -190,7 +196,15 @@ def _frame(
     return video, frame
 
 
-def _track(value: object) -> str:
+def frame_of(cell: str) -> tuple[str, int] | None:
+    """Video and frame of an ID such as `video_0001_0`, or None when it is none."""
+    found = _ID.fullmatch(cell.strip())
+    frame = int(found[2]) if found else MAX_WHOLE + 1
+    return (found[1], frame) if found and frame <= MAX_WHOLE else None
+
+
+def track_id(value: object) -> str:
+    """The id of a track, text or a whole number, which some write as `7.0`. Raises Wrong."""
     return _without_zeros(checks.identifier(value, "a track id"))
 
 

@@ -4,12 +4,13 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
-from operator import attrgetter, itemgetter
+from operator import itemgetter
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.predictions import Predictions
 from pipeline.scores import Submission
 from sitegen.evaluate import TextVectors
 from sitegen.score import Index, Mask, Real
@@ -24,8 +25,6 @@ _BLOCK = 2_048  # captions: cosines of two blocks are 16 MB
 _SHORT_RUN = 64
 
 T = TypeVar("T", bound=np.generic)
-
-_by_video = attrgetter("video_id", "rank")
 
 
 class _Plain(dict[int, str | None]):
@@ -93,11 +92,12 @@ def number_captions(
 
     Raises KeyError for a video or text that is not there.
     """
-    rows = sorted(submission.predictions, key=_by_video)
+    rows = Predictions.of(submission.predictions)
+    texts = rows.texts
     return NumberedCaptions(
-        np.array([number[row.video_id] for row in rows], dtype=np.int64),
-        vectors.rows(row.description for row in rows),
-        np.array([forms[row.description] for row in rows], dtype=np.int64),
+        np.array([number[video] for video in rows.video_ids], dtype=np.int64)[rows.video.codes],
+        vectors.rows(texts)[rows.description.codes],
+        np.array([forms[text] for text in texts], dtype=np.int64)[rows.description.codes],
     )
 
 

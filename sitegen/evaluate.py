@@ -3,16 +3,18 @@
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from operator import attrgetter
 
 import numpy as np
+import pyarrow as pa
 
 from pipeline.errors import Fault, FaultsError, InputError, OutsideError
 from pipeline.files import sha256_of
 from pipeline.interfaces import Embedder
-from pipeline.records import Prediction, TruthHazard
-from pipeline.scores import Evaluation, PairScore, Signature, Submission
+from pipeline.pairs import PairScores
+from pipeline.predictions import Predictions
+from pipeline.records import TruthHazard
+from pipeline.scores import Evaluation, Signature, Submission
 from sitegen.score import (
     METRIC_VERSION,
     Index,
@@ -26,7 +28,6 @@ from sitegen.score import (
 )
 
 _hazard_key = attrgetter("video_id", "hazard_id")
-_prediction_key = attrgetter("video_id", "rank")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +66,7 @@ def texts_of(submissions: Iterable[Submission], truth: Iterable[TruthHazard]) ->
     """The distinct texts that must be embedded to evaluate the submissions."""
     texts = {hazard.description for hazard in truth if not hazard.is_no_hazard}
     for submission in submissions:
-        texts.update(prediction.description for prediction in submission.predictions)
+        texts.update(Predictions.of(submission.predictions).texts)
     return texts
 
 
@@ -99,40 +100,32 @@ def evaluate(
     video_ids = sorted({hazard.video_id for hazard in truth})
     number = {video_id: place for place, video_id in enumerate(video_ids)}
     hazards = sorted((hazard for hazard in truth if not hazard.is_no_hazard), key=_hazard_key)
-    predictions = sorted(submission.predictions, key=_prediction_key)
+    predictions = Predictions.of(submission.predictions)
     _check(submission.name, predictions, number)
     vectors = vectors or embed_all(texts_of([submission], truth), embedder)
 
-    prediction_video = np.array([number[row.video_id] for row in predictions], dtype=np.int64)
+    video_number = np.array([number[video_id] for video_id in predictions.video_ids], dtype=np.int64)
+    prediction_video = video_number[predictions.video.codes]
     hazard_video = np.array([number[row.video_id] for row in hazards], dtype=np.int64)
     pair_prediction, pair_hazard = pair_rows(prediction_video, hazard_video, len(video_ids))
     cosines = pair_cosines(
         vectors.units,
-        vectors.rows(row.description for row in predictions)[pair_prediction],
+        vectors.rows(predictions.texts)[predictions.description.codes][pair_prediction],
         vectors.rows(row.description for row in hazards)[pair_hazard],
     )
     scores = score_pairs(cosines, prediction_video, hazard_video, len(video_ids), threshold)
     signature = Signature(
         METRIC_VERSION, embedder.name, embedder.sha256, truth_sha256, len(video_ids), threshold
     )
-    pairs = tuple(
-        PairScore(predictions[p].video_id, predictions[p].rank, hazards[h].hazard_id, cosine, similarity)
-        for p, h, cosine, similarity in zip(
-            pair_prediction.tolist(),
-            pair_hazard.tolist(),
-            cosines.tolist(),
-            similarities(cosines).tolist(),
-            strict=True,
-        )
-    )
+    hazard_ids = pa.array([row.hazard_id for row in hazards], pa.string())
+    pairs = PairScores(predictions, hazard_ids, pair_prediction, pair_hazard, cosines, similarities(cosines))
     videos = scores.records(video_ids)
     return Evaluation(submission, pairs, videos, scorecard(videos, signature))
 
 
-def _check(name: str, predictions: Sequence[Prediction], number: dict[str, int]) -> None:
+def _check(name: str, predictions: Predictions, number: dict[str, int]) -> None:
     """Raise FaultsError for unknown videos (one fault each) and for ranks given twice."""
     place = f"submission {name!r}"
-    unknown = sorted({row.video_id for row in predictions if row.video_id not in number})
     faults = [
         Fault(
             place,
@@ -142,19 +135,20 @@ def _check(name: str, predictions: Sequence[Prediction], number: dict[str, int])
             f"one of the {len(number)} video ids of the truth",
             "Correct the id, or leave the rows out.",
         )
-        for video_id in unknown
+        for video_id in predictions.video_ids
+        if video_id not in number
     ]
+    key = predictions.video.codes.astype(np.int64) << 32 | predictions.rank
     faults += [
         Fault(
             place,
             None,
             "rank",
-            f"rank {after.rank} twice in video {after.video_id!r}",
+            f"rank {again.rank} twice in video {again.video_id!r}",
             "each rank once in a video",
             "Number the predictions of a video 1, 2, 3, ...",
         )
-        for before, after in pairwise(predictions)
-        if _prediction_key(before) == _prediction_key(after)
+        for again in map(predictions.__getitem__, np.flatnonzero(key[1:] == key[:-1]).tolist())
     ]
     if faults:
         raise FaultsError(faults)

@@ -8,6 +8,8 @@ all videos stay.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from pipeline.columns import Coded
+from pipeline.predictions import FRAMES, TRACKS, Predictions
 from pipeline.records import TruthHazard
 from pipeline.scores import Evaluation
 from sitegen.gathered import Records
@@ -24,7 +26,12 @@ def totals_only(evaluation: Evaluation) -> Evaluation:
     The check's warnings name videos with a hazard.
     """
     submission = evaluation.submission
-    captions = tuple(replace(row, track_ids=(), frame_indices=()) for row in submission.predictions)
+    said = Predictions.of(submission.predictions)
+    captions = replace(
+        said,
+        track_ids=Coded.same((), len(said), TRACKS),
+        frame_indices=Coded.same((), len(said), FRAMES),
+    )
     return Evaluation(replace(submission, predictions=captions, warnings=()), (), (), evaluation.card)
 
 

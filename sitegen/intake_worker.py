@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pipeline.errors import CooolerError, FaultsError, InputError, OutsideError
 from pipeline.files import slug
+from pipeline.predictions import Predictions
 from sitegen.intake import Intake
 from sitegen.intake_records import Details, Report, State, Upload
 from sitegen.readers import ReadOptions, ReadPredictions
@@ -219,7 +220,7 @@ def _today() -> str:
 def _report(read: ReadPredictions, scores: dict[str, Any], place: str = "") -> Report:
     counts = {
         "predictions": len(read.predictions),
-        "videos_with_predictions": len({one.video_id for one in read.predictions}),
+        "videos_with_predictions": len(Predictions.of(read.predictions).video_ids),
     }
     return Report(
         warnings=read.warnings, source_format=read.source_format, scores={**counts, **scores}, slug=place

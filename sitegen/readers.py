@@ -6,19 +6,24 @@ write them (coool.py, outside.py).
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from pipeline.predictions import Predictions
 from pipeline.records import Prediction, TruthHazard
 from sitegen import checks
 from sitegen.captions import Captions, checked, some
-from sitegen.checks import Faults, Wrong, is_missing, visible
+from sitegen.cells import BAD, clean_column, missing_columns, note_repeats, unknown_columns
+from sitegen.checks import Faults, visible
+from sitegen.columns import COLUMNAR, RawColumns, accepted, raw_columns
 from sitegen.coool import coool, twocoool
+from sitegen.coool_columns import coool_predictions
 from sitegen.formats import NAMES, TABLES, ending_of, format_of, prediction_format_of, refuse_other_kind
 from sitegen.outside import coco, scripts
+from sitegen.shards import read_shards, shards_columns, shards_sheet
 from sitegen.sheets import Sheet, sheet_of
 from sitegen.texts import limit_rows
 from sitegen.unpack import Content, content_of
@@ -41,11 +46,7 @@ TRUTH_COLUMNS = ("video_id", "hazard_id", "label", "description", "track_id", "f
 
 _PREDICTION_REQUIRED = PREDICTION_COLUMNS[:3]
 _TRUTH_REQUIRED = TRUTH_COLUMNS[:4]
-_SHOWN_COLUMNS = 20
 _SHA256 = re.compile(r"[0-9a-f]{64}")
-_TEXTS = {str, type(None)}
-_NUMBERS = {int, type(None)}
-_BAD: Any = object()  # a cell whose fault is already noted
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class ReadPredictions:
     file's name should end in (`csv`, `csv.gz`, `json`), told by its content.
     """
 
-    predictions: tuple[Prediction, ...]
+    predictions: Sequence[Prediction]
     source_format: str
     sha256: str
     warnings: tuple[str, ...]
@@ -91,33 +92,104 @@ def read_predictions(
     content = content_of(path, faults)
     source_format = choose_format(content, options, faults)
     hazards = None if truth is None else list(truth)
-    known = None if hazards is None else {hazard.video_id for hazard in hazards}
-    if source_format in TABLES:
-        sheet = sheet_of(content.data, source_format, PREDICTION_COLUMNS, faults)
-        ids = VideoIds(known, options.video_map, sheet.cells.get("video_id", ()))
-        predictions = _of_sheet(sheet, ids, faults)
-        warnings = _unknown_columns(sheet, PREDICTION_COLUMNS)
-        config = sheet.metadata.get("config_sha256", "")
-    else:
-        captions = _captions(content.data, source_format, options, faults)
-        ids = VideoIds(known, options.video_map, captions.rows)
-        predictions = _of_captions(captions, ids, faults)
-        warnings = captions.warnings
-        config = ""
-    predictions.sort(key=attrgetter("video_id", "rank"))
-    warnings += ids.warnings()
-    if not predictions:
-        warnings.append("The file holds no prediction.")
-    warnings += _missing_videos(predictions, hazards or ())
+    known = _known(hazards)
+    found = by_column(content.data, source_format, known, options)
+    if found is None:
+        found = by_cell(content.data, source_format, known, options, faults)
     ending = ending_of(source_format)
-    return ReadPredictions(
-        tuple(predictions),
-        source_format,
-        content.sha256,
-        tuple(warnings),
-        config if _SHA256.fullmatch(config) else "",
-        f"{ending}.{content.packing}" if content.packing else ending,
-    )
+    ending = f"{ending}.{content.packing}" if content.packing else ending
+    return _read(found, source_format, content.sha256, ending, hazards)
+
+
+def read_sharded(
+    folder: Path, truth: Iterable[TruthHazard] | None = None, options: ReadOptions | None = None
+) -> ReadPredictions:
+    """The predictions in a folder of Parquet shards, as `read_predictions` gives those of one file.
+
+    `sha256` is over the shards' names and bytes (see `read_shards`). Raises FaultsError, whose faults name
+    the shard and its row.
+    """
+    options = options or ReadOptions()
+    faults = Faults(visible(str(folder), 1_000))
+    if options.source_format not in ("", "parquet") or options.caption_column:
+        faults.stop("a folder", "one file of the format that was asked for", "Give the file itself.")
+    shards = read_shards(folder, faults)
+    hazards = None if truth is None else list(truth)
+    known = _known(hazards)
+    raw = shards_columns(shards, PREDICTION_COLUMNS)
+    found = None if raw is None else _of_columns(raw, known, options)
+    if found is None:
+        found = _of_cells(shards_sheet(shards, PREDICTION_COLUMNS, faults), known, options, faults)
+    return _read(found, "parquet", shards.sha256, "parquet", hazards)
+
+
+def read_given(
+    path: Path, truth: Iterable[TruthHazard] | None = None, options: ReadOptions | None = None
+) -> ReadPredictions:
+    """The predictions in a file or in a folder of shards; raises as `read_predictions` does."""
+    return (read_sharded if path.is_dir() else read_predictions)(path, truth, options)
+
+
+def _known(hazards: Sequence[TruthHazard] | None) -> set[str] | None:
+    return None if hazards is None else {hazard.video_id for hazard in hazards}
+
+
+def _read(
+    found: "_Found", source_format: str, sha256: str, ending: str, hazards: Sequence[TruthHazard] | None
+) -> ReadPredictions:
+    warnings = [*found.warnings, *found.ids.warnings()]
+    if not found.predictions:
+        warnings.append("The file holds no prediction.")
+    warnings += _missing_videos(found.predictions, hazards or ())
+    config = found.config if _SHA256.fullmatch(found.config) else ""
+    return ReadPredictions(found.predictions, source_format, sha256, tuple(warnings), config, ending)
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """The predictions in a file, and how the ids of their videos were taken; `config` is unchecked."""
+
+    predictions: Predictions
+    ids: VideoIds
+    warnings: list[str]
+    config: str = ""
+
+
+def by_column(data: bytes, source_format: str, known: set[str] | None, options: ReadOptions) -> _Found | None:
+    """What a file without any fault holds, read column by column; None when in doubt (see columns.py)."""
+    if source_format == "coool":
+        captions = coool_predictions(data, known, options.video_map)
+        return captions and _Found(captions[0].predictions, captions[0].ids, captions[1])
+    raw = raw_columns(data, source_format, PREDICTION_COLUMNS) if source_format in COLUMNAR else None
+    return None if raw is None else _of_columns(raw, known, options)
+
+
+def _of_columns(raw: RawColumns, known: set[str] | None, options: ReadOptions) -> _Found | None:
+    found = accepted(raw, known, options.video_map)
+    if found is None:
+        return None
+    warnings = unknown_columns(raw.names, PREDICTION_COLUMNS)
+    return _Found(found.predictions, found.ids, warnings, raw.metadata.get("config_sha256", ""))
+
+
+def by_cell(
+    data: bytes, source_format: str, known: set[str] | None, options: ReadOptions, faults: Faults
+) -> _Found:
+    """What a file holds, read cell by cell. Raises FaultsError with every fault."""
+    if source_format in TABLES:
+        sheet = sheet_of(data, source_format, PREDICTION_COLUMNS, faults)
+        return _of_cells(sheet, known, options, faults)
+    captions = _captions(data, source_format, options, faults)
+    ids = VideoIds(known, options.video_map, captions.rows)
+    predictions = Predictions.of(_of_captions(captions, ids, faults))
+    return _Found(predictions, ids, captions.warnings)
+
+
+def _of_cells(sheet: Sheet, known: set[str] | None, options: ReadOptions, faults: Faults) -> _Found:
+    ids = VideoIds(known, options.video_map, sheet.cells.get("video_id", ()))
+    predictions = Predictions.of(_of_sheet(sheet, ids, faults))
+    warnings = unknown_columns(sheet.columns, PREDICTION_COLUMNS)
+    return _Found(predictions, ids, warnings, sheet.metadata.get("config_sha256", ""))
 
 
 def choose_format(content: Content, options: ReadOptions, faults: Faults) -> str:
@@ -159,14 +231,14 @@ def _of_captions(captions: Captions, ids: VideoIds, faults: Faults) -> list[Pred
 
 def _of_sheet(sheet: Sheet, ids: VideoIds, faults: Faults) -> list[Prediction]:
     """The predictions of a file with our columns."""
-    _missing_columns(sheet, _PREDICTION_REQUIRED, faults)
-    videos = _column(sheet, "video_id", ids, faults)
-    ranks = _column(sheet, "rank", lambda value: checks.whole(value, 1), faults)
-    descriptions = _column(sheet, "description", checks.description, faults)
-    labels = _column(sheet, "label", checks.text, faults, None)
-    tracks = _column(sheet, "track_ids", checks.track_ids, faults, ())
-    frames = _column(sheet, "frame_indices", checks.frame_indices, faults, ())
-    _unique(sheet, videos, ranks, "rank", faults)
+    missing_columns(sheet, _PREDICTION_REQUIRED, faults)
+    videos = clean_column(sheet, "video_id", ids, faults)
+    ranks = clean_column(sheet, "rank", lambda value: checks.whole(value, 1), faults)
+    descriptions = clean_column(sheet, "description", checks.description, faults)
+    labels = clean_column(sheet, "label", checks.text, faults, None)
+    tracks = clean_column(sheet, "track_ids", checks.track_ids, faults, ())
+    frames = clean_column(sheet, "frame_indices", checks.frame_indices, faults, ())
+    note_repeats(sheet, videos, ranks, "rank", faults)
     faults.raise_if_any()
     rows = zip(videos, ranks, descriptions, labels, tracks, frames, strict=True)
     return [Prediction(*row) for row in rows]
@@ -182,19 +254,19 @@ def read_truth(path: Path) -> list[TruthHazard]:
     content = content_of(path, faults)
     source_format = format_of(content.data, content.name, faults)
     sheet = sheet_of(content.data, source_format, TRUTH_COLUMNS, faults)
-    _missing_columns(sheet, _TRUTH_REQUIRED, faults)
+    missing_columns(sheet, _TRUTH_REQUIRED, faults)
     if not sheet.rows and not faults.kept:
         faults.stop("no rows", "at least one video", "Add a row for every video of the benchmark.")
 
-    videos = _column(sheet, "video_id", checks.safe_identifier, faults)
-    labels = _column(sheet, "label", checks.text, faults, "")
-    descriptions = _column(sheet, "description", checks.description, faults, "")
-    hazard_ids = _column(sheet, "hazard_id", checks.identifier, faults, "")
-    tracks = _column(sheet, "track_id", checks.identifier, faults, None)
-    firsts = _column(sheet, "first_frame", lambda value: checks.whole(value, 0), faults, None)
-    lasts = _column(sheet, "last_frame", lambda value: checks.whole(value, 0), faults, None)
+    videos = clean_column(sheet, "video_id", checks.safe_identifier, faults)
+    labels = clean_column(sheet, "label", checks.text, faults, "")
+    descriptions = clean_column(sheet, "description", checks.description, faults, "")
+    hazard_ids = clean_column(sheet, "hazard_id", checks.identifier, faults, "")
+    tracks = clean_column(sheet, "track_id", checks.identifier, faults, None)
+    firsts = clean_column(sheet, "first_frame", lambda value: checks.whole(value, 0), faults, None)
+    lasts = clean_column(sheet, "last_frame", lambda value: checks.whole(value, 0), faults, None)
     for row, hazard_id, label, text in zip(sheet.rows, hazard_ids, labels, descriptions, strict=True):
-        if label and label is not _BAD and text == "":
+        if label and label is not BAD and text == "":
             mend = "Describe the hazard in a sentence, or clear the label of a video without hazard."
             faults.add(row, "description", "a label without a description", "both or neither", mend)
         if hazard_id == "" and text:
@@ -203,7 +275,7 @@ def read_truth(path: Path) -> list[TruthHazard]:
         if isinstance(first, int) and isinstance(last, int) and last < first:
             found = f"{last}, before first_frame {first}"
             faults.add(row, "last_frame", found, "first_frame or later", "Swap or correct the two.")
-    _unique(sheet, videos, hazard_ids, "hazard_id", faults)
+    note_repeats(sheet, videos, hazard_ids, "hazard_id", faults)
     _no_hazard_alone(sheet, videos, descriptions, faults)
     _one_spelling(sheet, videos, faults)
     faults.raise_if_any()
@@ -211,74 +283,10 @@ def read_truth(path: Path) -> list[TruthHazard]:
     return sorted((TruthHazard(*row) for row in rows), key=attrgetter("video_id", "hazard_id"))
 
 
-def _column(
-    sheet: Sheet, name: str, check: Callable[[Any], Any], faults: Faults, missing: Any = _BAD
-) -> list[Any]:
-    """The clean values of a column, `_BAD` where a fault was noted.
-
-    A cell that holds nothing becomes `missing`; left at `_BAD`, the column is required and `check`
-    words the fault. Equal texts and numbers are checked once: ids, ranks and captions repeat.
-    """
-    cells = sheet.cells.get(name)
-    if cells is None:
-        return [_BAD if name in faults.kept else missing] * len(sheet.rows)
-    kinds = set(map(type, cells))
-    results: Iterator[Any] = (_result(value, check, missing) for value in cells)
-    if kinds <= _TEXTS or kinds <= _NUMBERS:
-        of_value = {value: _result(value, check, missing) for value in dict.fromkeys(cells)}
-        results = map(of_value.__getitem__, cells)
-        if Wrong not in set(map(type, of_value.values())):
-            return list(results)
-    clean: list[Any] = []
-    for row, result in zip(sheet.rows, results, strict=True):
-        is_wrong = type(result) is Wrong
-        if is_wrong:
-            faults.add(row, name, result.found, result.expected, result.mend)
-        clean.append(_BAD if is_wrong else result)
-    return clean
-
-
-def _result(value: Any, check: Callable[[Any], Any], missing: Any) -> Any:
-    """The clean value of a cell, or what is wrong with it."""
-    try:
-        return missing if missing is not _BAD and is_missing(value) else check(value)
-    except Wrong as wrong:
-        return wrong.with_traceback(None)
-
-
-def _missing_columns(sheet: Sheet, required: Sequence[str], faults: Faults) -> None:
-    if not sheet.columns and faults.kept:  # no line could be read, so nothing is known of columns
-        return
-    spelled = {name.strip().lower().replace(" ", "_").replace("-", "_"): name for name in sheet.columns}
-    for name in required:
-        if name not in sheet.columns:
-            near = spelled.get(name)
-            found = f"the columns {', '.join(visible(column) for column in sheet.columns[:_SHOWN_COLUMNS])}"
-            mend = f"Rename '{visible(near)}' to '{name}'." if near else "Add the column."
-            faults.add(None, name, f"no such column, but {found}", f"a column `{name}`", mend)
-
-
-def _unknown_columns(sheet: Sheet, known: Sequence[str]) -> list[str]:
-    unknown = [visible(name) for name in sheet.columns if name not in known]
-    if not unknown:
-        return []
-    return [f"Ignored unknown columns: {some(unknown)}."]
-
-
-def _unique(sheet: Sheet, videos: list[Any], numbers: list[Any], column: str, faults: Faults) -> None:
-    first_row: dict[tuple[Any, Any], int] = {}
-    for row, key in zip(sheet.rows, zip(videos, numbers, strict=True), strict=True):
-        before = first_row.setdefault(key, row)
-        if before != row and _BAD not in key and key[1] != "":
-            again = f"{column} '{visible(str(key[1]))}' again"
-            found = f"{again} in video '{visible(key[0])}' (first in row {before})"
-            faults.add(row, column, found, f"each {column} once in a video", "Renumber or remove the row.")
-
-
 def _no_hazard_alone(sheet: Sheet, videos: list[Any], descriptions: list[Any], faults: Faults) -> None:
     rows_of: dict[str, list[tuple[int, bool]]] = {}
     for row, video, text in zip(sheet.rows, videos, descriptions, strict=True):
-        if video is not _BAD and text is not _BAD:
+        if video is not BAD and text is not BAD:
             rows_of.setdefault(video, []).append((row, text == ""))
     for video, rows in rows_of.items():
         if len(rows) > 1:
@@ -292,7 +300,7 @@ def _one_spelling(sheet: Sheet, videos: list[Any], faults: Faults) -> None:
     """Ids that differ only in case would name one page on many file systems."""
     spelled: dict[str, str] = {}
     for row, video in zip(sheet.rows, videos, strict=True):
-        if video is not _BAD:
+        if video is not BAD:
             before = spelled.setdefault(video.lower(), video)
             if before != video:
                 found = f"'{video}' beside '{before}'"
@@ -300,10 +308,9 @@ def _one_spelling(sheet: Sheet, videos: list[Any], faults: Faults) -> None:
                 faults.add(row, "video_id", found, expected, "Rename one of them.")
 
 
-def _missing_videos(predictions: Sequence[Prediction], truth: Iterable[TruthHazard]) -> list[str]:
-    predicted = {prediction.video_id for prediction in predictions}
+def _missing_videos(predictions: Predictions, truth: Iterable[TruthHazard]) -> list[str]:
     with_hazard = {hazard.video_id for hazard in truth if not hazard.is_no_hazard}
-    missing = sorted(with_hazard - predicted)
+    missing = sorted(with_hazard.difference(predictions.video_ids))
     if not missing:
         return []
     return [

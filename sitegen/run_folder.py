@@ -1,4 +1,4 @@
-"""What a user names as a predictions file: the file, or the folder of a run with all that it noted."""
+"""What a user names as predictions: a file, shards, or the folder of a run with all that it noted."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,8 +8,8 @@ from sitegen.packing import EXTRAS
 
 
 def predictions_of(file: Path) -> Path:
-    """The predictions file meant by a file, or by the folder of a run."""
-    return file / "predictions.parquet" if file.is_dir() else file
+    """The predictions file of a run folder; any other file, or folder of shards, is meant itself."""
+    return file / "predictions.parquet" if (file / "predictions.parquet").is_file() else file
 
 
 def extras_of(file: Path) -> dict[str, Path]:
@@ -22,7 +22,7 @@ def extras_of(file: Path) -> dict[str, Path]:
 
 def with_agents(sender: Sender, file: Path) -> Sender:
     """The sender, with the agents that a run folder names, unless the sender named some."""
-    if sender.agents or not file.is_dir():
+    if sender.agents or predictions_of(file) == file:
         return sender
     from pipeline.table import metadata
 

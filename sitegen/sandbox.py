@@ -22,11 +22,13 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import Fault, FaultsError, OutsideError
+from pipeline.predictions import Predictions
 from pipeline.records import Prediction, TruthHazard
 from pipeline.tables import PREDICTIONS
 from sitegen import checks
 from sitegen.checks import visible
-from sitegen.readers import ReadOptions, ReadPredictions
+from sitegen.columns import accepted, raw_columns
+from sitegen.readers import PREDICTION_COLUMNS, ReadOptions, ReadPredictions
 from sitegen.sandbox_child import LENGTH_BYTES, MARK, MAX_RESULT_BYTES
 from sitegen.texts import MAX_ROWS
 
@@ -171,12 +173,15 @@ def _result(
             _stop(name, f"a file that takes more than {limits.memory_bytes // 2**20:,} MB of memory", limits)
         if said.stopped:
             _stop(name, f"a file that cannot be read ({visible(said.stopped, 300)})", limits)
-        predictions = _predictions(table, name)
-        _check(predictions, videos)
+        predictions = _clean_columns(table, videos)
+        if predictions is None:
+            rows = _predictions(table, name)
+            _check(rows, videos)
+            predictions = Predictions.of(rows)
     except (ValidationError, ValueError, checks.Wrong, pa.ArrowException, OSError):
         _stop(name, "a file that confuses the process that reads it", limits)
     return ReadPredictions(
-        tuple(predictions),
+        predictions,
         said.source_format,
         said.sha256,
         tuple(said.warnings),
@@ -188,6 +193,15 @@ def _result(
 def _stop(name: str, found: str, limits: Limits) -> NoReturn:
     expected = f"a table that is read within {limits.memory_bytes // 2**20:,} MB and {limits.seconds:g} s"
     raise FaultsError([Fault(name, None, None, found, expected, _SMALLER)])
+
+
+def _clean_columns(table: bytes, videos: set[str] | None) -> Predictions | None:
+    """The child's table when its columns are as a reader leaves them; None when in doubt."""
+    raw = raw_columns(table, "parquet", PREDICTION_COLUMNS)
+    if raw is None or set(raw.names) != set(PREDICTION_COLUMNS):
+        return None
+    found = accepted(raw, videos, {})
+    return found.predictions if found is not None and found.is_verbatim else None
 
 
 def _predictions(table: bytes, name: str) -> list[Prediction]:

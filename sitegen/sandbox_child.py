@@ -19,7 +19,7 @@ from typing import Any
 from pipeline.errors import FaultsError
 from pipeline.records import TruthHazard
 from pipeline.tables import PREDICTIONS
-from sitegen.readers import ReadOptions, read_predictions
+from sitegen.readers import ReadOptions, read_given
 
 if sys.platform != "win32":
     import resource
@@ -64,7 +64,7 @@ def _read(job: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
             TruthHazard(video_id, str(number), "", "a hazard" if has_hazard else "")
             for number, (video_id, has_hazard) in enumerate(job["truth"])
         ]
-    read = read_predictions(Path(job["path"]), truth, ReadOptions(**job["options"]))
+    read = read_given(Path(job["path"]), truth, ReadOptions(**job["options"]))
     said = {
         "source_format": read.source_format,
         "sha256": read.sha256,

@@ -18,6 +18,8 @@ from sitegen.texts import RepeatedKeys, csv_rows, json_record, limit_rows
 
 MAX_UNPACKED_BYTES = 4 * 2**30
 MAX_LIST_BYTES = 2**30
+LIST_ROWS = 4_096
+"""How many rows' lists are unpacked before their bytes are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +127,7 @@ def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
         strings = [leaf.path for leaf in leaves if leaf.physical_type == "BYTE_ARRAY"]
         with pq.ParquetFile(pa.BufferReader(data), read_dictionary=strings) as file:
             names = file.schema_arrow.names
-            marks = {_text(key): _text(value) for key, value in (file.schema_arrow.metadata or {}).items()}
+            marks = marks_of(file.schema_arrow)
             for name in sorted({name for name in known if names.count(name) > 1}):
                 faults.stop(f"{names.count(name)} columns `{name}`", "one", "Remove or rename one.")
             lists = {leaf.path.split(".")[0] for leaf in leaves if leaf.max_repetition_level > 0}
@@ -140,25 +142,38 @@ def _parquet(data: bytes, known: Sequence[str], faults: Faults) -> Sheet:
     return Sheet(tuple(names), range(1, metadata.num_rows + 1), cells, marks)
 
 
-def _text(mark: bytes) -> str:
-    return mark.decode("utf-8", "replace")
+def marks_of(schema: pa.Schema) -> dict[str, str]:
+    """A Parquet file's text marks."""
+    marks = (schema.metadata or {}).items()
+    return {key.decode("utf-8", "replace"): value.decode("utf-8", "replace") for key, value in marks}
 
 
 def _parquet_bounds(metadata: pq.FileMetaData, faults: Faults) -> None:
     limit_rows(metadata.num_rows, faults)
-    # A row group's columns are not asked: pyarrow aborts the process where a damaged file has none.
-    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
-    unpacked = sum(group.total_byte_size for group in groups)
+    unpacked = _unpacked_bytes(metadata)
     if unpacked > MAX_UNPACKED_BYTES:
         expected = f"at most {MAX_UNPACKED_BYTES:,} bytes"
         faults.stop(f"{unpacked:,} bytes, unpacked", expected, "Leave out columns or predictions.")
+
+
+def unpacked_bytes(data: bytes) -> int:
+    """What a Parquet file's footer says its pages unpack to; 0 when it cannot be read."""
+    try:
+        return _unpacked_bytes(pq.read_metadata(pa.BufferReader(data)))
+    except (pa.ArrowException, OSError, ValueError, IndexError, MemoryError):
+        return 0
+
+
+def _unpacked_bytes(metadata: pq.FileMetaData) -> int:
+    # A row group's columns are not asked: pyarrow aborts the process where a damaged file has none.
+    return sum(metadata.row_group(place).total_byte_size for place in range(metadata.num_row_groups))
 
 
 def _lists(file: pq.ParquetFile, name: str, faults: Faults) -> list[Any]:
     """A column of lists, read in parts, since few bytes of a file can hold very many items."""
     values: list[Any] = []
     unpacked = 0
-    for batch in file.iter_batches(batch_size=4_096, columns=[name]):
+    for batch in file.iter_batches(batch_size=LIST_ROWS, columns=[name]):
         unpacked += batch.nbytes
         if unpacked > MAX_LIST_BYTES:
             found = f"lists of more than {MAX_LIST_BYTES // 2**20} MB in `{name}`"

@@ -45,3 +45,10 @@ def lines(read: Callable[[], object]) -> list[int | None]:
     with pytest.raises(FaultsError) as caught:
         read()
     return [fault.line for fault in caught.value.faults]
+
+
+def files(read: Callable[[], object]) -> list[str]:
+    """The file of every fault that `read` raises."""
+    with pytest.raises(FaultsError) as caught:
+        read()
+    return [fault.file for fault in caught.value.faults]

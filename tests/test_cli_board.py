@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.records import Prediction
+from pipeline.tables import PREDICTIONS
 from tests.test_cli import coooler
 
 TRUTH = "video_id,hazard_id,label,description\n" + "".join(
@@ -126,9 +128,26 @@ def test_wrong_options_say_what_is_right(folder: Path) -> None:
     assert "--name NAME" in run.stderr
     run = coooler(folder, "submit", "videos", "--name", "A folder without predictions")
     assert run.returncode == 1
-    assert "predictions.parquet: found no such file" in run.stderr
+    assert "videos: found no Parquet file in it" in run.stderr
     (folder / "about.toml").write_text('name = "x"\nbesm = 0.99\n')
     run = coooler(folder, "submit", "right.csv", "--about", "about.toml")
     assert run.returncode == 1
     assert "besm" in run.stderr
     assert not (folder / "submissions").exists()
+
+
+def test_a_folder_of_shards_is_checked_scored_and_stored_as_one_file(folder: Path) -> None:
+    shards = folder / "shards"
+    for number, caption in enumerate(RIGHT):
+        PREDICTIONS.write(shards / f"part-{number}.parquet", [Prediction(f"v{number}", 1, caption)])
+    (shards / "_SUCCESS").touch()
+    checked = json.loads(coooler(folder, "check", "shards", "--json").stdout)
+    assert (checked["format"], checked["predictions"], checked["faults"]) == ("parquet", 6, [])
+    assert json.loads(coooler(folder, "score", "shards", "--json").stdout)["besm"] == 1.0
+    for _ in range(2):  # the same again changes nothing
+        run = coooler(folder, "submit", "shards", "--name", "Right", "--json")
+        assert run.returncode == 0, run.stderr
+    assert len((folder / "submissions" / "ledger.jsonl").read_text().splitlines()) == 1
+    (shards / "part-6.parquet").write_text("video_id,rank,description\n")
+    run = coooler(folder, "check", "shards")
+    assert run.returncode == 1 and "part-6.parquet" in run.stderr

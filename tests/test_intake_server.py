@@ -111,7 +111,8 @@ def test_every_fault_comes_back_as_text(real: Server) -> None:
 
 
 def test_a_file_that_takes_too_much_is_refused_and_the_work_goes_on(real: Server) -> None:
-    rows = "".join(f"v1,{number},A cat\n" for number in range(1, 2_000_001))
+    rows = "".join(f"v1,{number},A cat\n" for number in range(1, 2_000_000))
+    rows += 'v1,2000000,"A\ncat"\n'  # so that every cell has to be looked at
     heavy = real.send(kind="submit", name="Heavy", file=f"video_id,rank,description\n{rows}".encode())
     light = real.send(kind="check", name="Light", file=CSV.encode())
     told = real.done(heavy)
