@@ -28,6 +28,7 @@ from sitegen.page_restoration import RestorationPage, restoration_files, restora
 from sitegen.page_submission import submission_page
 from sitegen.page_submit import SubmitPage, submit_files, submit_page
 from sitegen.page_video import Place, video_page
+from sitegen.page_videos import VideoListPage, is_long, list_files, list_pages
 from sitegen.page_vote import VotePage, vote_files, vote_page
 from sitegen.spreads import spreads
 from sitegen.submission_contexts import SubmissionPage
@@ -39,6 +40,7 @@ from sitegen.words import shorten, visible
 Context: TypeAlias = (
     LeaderboardPage
     | VideosPage
+    | VideoListPage
     | VideoPage
     | SubmissionPage
     | FailuresPage
@@ -80,7 +82,11 @@ def make_pages(data: SiteData) -> Iterator[Page]:
     yield Page("index.html", "leaderboard.html", made)
     about = _("All {n} videos.") if data.hidden else _("All {n} videos with their hazards.")
     shell = _shell(data, _("Videos"), about.format(n=len(data.truth)), "", "videos")
-    yield Page("videos.html", "videos.html", partial(videos_page, data, shell))
+    if is_long(data):
+        for path, listed in list_pages(data, partial(_list_shell, data)):
+            yield Page(path, "video_list.html", listed)
+    else:
+        yield Page("videos.html", "videos.html", partial(videos_page, data, shell))
     yield from _video_pages(data)
     for system in data.systems:
         about = _("{system}: scores, every video, provenance.").format(system=visible(system.name))
@@ -159,6 +165,7 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
         yield from compare_files(data)
         yield from failure_files(data, _blames(data))
     yield from board_files(data)
+    yield from list_files(data)
     yield from restoration_files(data)
     if not data.systems:
         return
@@ -180,6 +187,10 @@ def _point(system: System) -> charts.Point:
     card, sure = system.evaluation.card, system.uncertainty
     besm, sam = (sure.besm.low, sure.besm.high), (sure.sam.low, sure.sam.high)
     return charts.Point(system.name, card.besm, card.sam, card.detection_rate, besm, sam)
+
+
+def _list_shell(data: SiteData, title: str, description: str, root: str) -> Shell:
+    return _shell(data, title, description, root, "videos")
 
 
 def _shell(data: SiteData, title: str, description: str, root: str, section: str) -> Shell:
