@@ -64,9 +64,14 @@ class ListPage:
     sections: tuple[Section, ...]
 
     @property
+    def video_ids(self) -> tuple[str, ...]:
+        """The videos on the page, in order."""
+        return tuple(video_id for section in self.sections for video_id in section.video_ids)
+
+    @property
     def last(self) -> int:
         """The number of the last video."""
-        return self.first + sum(len(section.video_ids) for section in self.sections) - 1
+        return self.first + len(self.video_ids) - 1
 
 
 def pages_of(listing: Listing) -> Iterator[ListPage]:

@@ -24,13 +24,13 @@ from sitegen.listing import (
     Listing,
     ListPage,
     by_label,
-    numbers,
     pages_of,
     path_of,
     places_of,
 )
 from sitegen.numerals import plural
 from sitegen.page_board import found_by, state_of, video_card
+from sitegen.pager import Pager, pager
 from sitegen.shards import Shards
 from sitegen.words import shorten, visible
 
@@ -72,15 +72,6 @@ class Counted:
 
 
 @dataclass(frozen=True, slots=True)
-class NumberLink:
-    """A link to a page by its number; without `text` it stands for those left out."""
-
-    text: str
-    href: str
-    here: bool
-
-
-@dataclass(frozen=True, slots=True)
 class CardSection:
     """Cards under a heading; without a heading when `title` is empty."""
 
@@ -104,11 +95,8 @@ class VideoListPage:
     lists: tuple[Counted, ...]
     labels: tuple[Counted, ...]
     all_labels: Link | None
-    numbers: tuple[NumberLink, ...]
-    previous: str
-    following: str
+    pager: Pager
     sections: tuple[CardSection, ...]
-    index_file: str
 
 
 class MakesShell(Protocol):
@@ -161,17 +149,12 @@ def _list_page(
         title = _("{title}, page {n} of {pages}").format(
             title=name, n=whole(page.number), pages=whole(listing.pages)
         )
-    span = _span(page)
+    span = span_of(page)
     path = path_of(listing.name, page.number)
     labels = next((one for one in lists if one.name == LABELS), None)
     shown = {ALL: SHOWN_LABELS, LABELS: INDEXED_LABELS}.get(listing.name, 0)
     places = list(places_of(labels)) if labels and shown and page.number == 1 else []
     often = set(sorted(range(len(places)), key=lambda place: -len(places[place][0].video_ids))[:shown])
-    near = {
-        number: path_of(listing.name, number)
-        for number in (page.number - 1, page.number + 1)
-        if 1 <= number <= listing.pages
-    }
     return VideoListPage(
         shell=make_shell(title, span, "../" if "/" in path else ""),
         hidden=data.hidden,
@@ -189,16 +172,7 @@ def _list_page(
         all_labels=Link(_("All {n} labels").format(n=whole(len(places))), path_of(LABELS))
         if len(places) > SHOWN_LABELS and listing.name == ALL
         else None,
-        numbers=tuple(
-            NumberLink("", "", False)
-            if number is None
-            else NumberLink(whole(number), path_of(listing.name, number), number == page.number)
-            for number in numbers(page.number, listing.pages)
-        )
-        if listing.pages > 1
-        else (),
-        previous=near.get(page.number - 1, ""),
-        following=near.get(page.number + 1, ""),
+        pager=pager(page.number, listing.pages, partial(path_of, listing.name)),
         sections=tuple(
             CardSection(
                 section.group.anchor,
@@ -212,7 +186,6 @@ def _list_page(
             )
             for section in page.sections
         ),
-        index_file=INDEX_FILE,
     )
 
 
@@ -221,7 +194,7 @@ def _counted(one: Listing, here: Listing) -> Counted:
     return Counted(words[one.name], path_of(one.name), whole(one.total), one is here)
 
 
-def _span(page: ListPage) -> str:
+def span_of(page: ListPage) -> str:
     """Which of the videos stand on the page."""
     first, last = page.sections[0], page.sections[-1]
     ends = (
