@@ -2,8 +2,8 @@
 
 VIDEOS is 20,000 when it is not given. Texts are generated and no video has a clip; the pages of single
 videos are left out, since none of them grows with the number of videos. Prints what each kind of page
-loads when it is opened, when it is painted and when nothing more is asked for, and how long the list of videos
-takes for its shards and for an answer.
+loads when it is opened, when it is painted and when nothing more is asked for, and how long the list of
+videos takes for its shards and for an answer.
 """
 
 import random

@@ -106,6 +106,8 @@ FLOORS = [
         "sitegen.blocks",
         "sitegen.intake_limits",
         "sitegen.language",
+        "sitegen.listing",
+        "sitegen.shards",
         "sitegen.words",
     ],
     [
@@ -120,6 +122,7 @@ FLOORS = [
         "sitegen.ledger",
         "sitegen.manifest",
         "sitegen.numerals",
+        "sitegen.pager",
         "sitegen.serve",
     ],
     [
@@ -211,7 +214,6 @@ FLOORS = [
         "sitegen.compare_files",
         "sitegen.exports",
         "sitegen.page_failures",
-        "sitegen.page_submission",
         "sitegen.spreads",
         "sitegen.standings",
         "sitegen.transcript",
@@ -226,8 +228,10 @@ FLOORS = [
     [
         "sitegen.card_data",
         "sitegen.page_restoration",
+        "sitegen.page_videos",
     ],
     [
+        "sitegen.page_submission",
         "sitegen.page_video",
     ],
     [
