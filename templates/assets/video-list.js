@@ -197,7 +197,7 @@
       event.preventDefault();
       clear();
     }
-    if (key === "ArrowDown" && target === search) {
+    if ({ ArrowDown: true }[key] && target === search) {
       event.preventDefault();
       step(1);
     }
