@@ -75,8 +75,8 @@ def main(videos: int, folder: Path) -> None:
             count = page.text_content("#list-count")
             print(f"videos.html: “{query}” answered in {median(answers):.0f} ms (goal: 100): {count}")
         page = browser.new_page(viewport={"width": 1440, "height": 900})
-        page.goto(f"{root}/failures.html?kind=not-seen")
         begun = time.perf_counter()
+        page.goto(f"{root}/failures.html?kind=not-seen", timeout=180_000)
         page.wait_for_function(
             "() => { const bar = document.querySelector('#fail-tool'); return bar && !bar.hidden"
             " && document.querySelector('#fail-progress').hidden; }",
