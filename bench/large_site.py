@@ -116,13 +116,15 @@ def _build(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         write_text(Path(scratch) / "coooler.toml", 'name = "Large"\n')
         benchmark = open_benchmark(Path(scratch))
-        truth = {row.video_id: (row,) for row in (_hazard(number, chance) for number in range(VIDEOS))}
+        truth = made_truth(VIDEOS, chance)
         names = path_names(truth)
         media = {
             video_id: replace(pictures[place % len(pictures)], video_id=video_id, name=names[video_id])
             for place, video_id in enumerate(truth)
         }
-        board = _board([row for rows in truth.values() for row in rows], chance)
+        rows = [row for found in truth.values() for row in found]
+        submissions = made_submissions(rows, SYSTEMS, chance)
+        board = made_board(submissions, rows, with_probes=True)
         data = gather(benchmark, truth, {}, media, board)
         digest = put_pages(output, data, open_embedder(), lambda what, done, total: None)
         output.finish(digest, {}, "", {})
@@ -133,25 +135,33 @@ def _text(chance: random.Random) -> tuple[str, str]:
     return thing, f"A {thing} {chance.choice(_DOINGS)}{chance.choice(_PLACES)}"
 
 
-def _hazard(number: int, chance: random.Random) -> TruthHazard:
-    label, text = _text(chance)
-    return TruthHazard(f"v{number:05}", "1", label, text)
+def made_truth(videos: int, chance: random.Random) -> dict[str, tuple[TruthHazard, ...]]:
+    """Video id -> its one hazard."""
+    ids = [f"v{number:05}" for number in range(videos)]
+    return {video_id: (TruthHazard(video_id, "1", *_text(chance)),) for video_id in ids}
 
 
-def _board(truth: list[TruthHazard], chance: random.Random) -> list[Standing]:
+def made_submissions(truth: list[TruthHazard], systems: int, chance: random.Random) -> list[Submission]:
     """Systems that are right ever less often, with one or two captions a video."""
     submissions = []
-    for number in range(SYSTEMS):
+    for number in range(systems):
         rows = []
         for hazard in truth:
-            right = chance.random() > number / SYSTEMS
+            right = chance.random() > number / systems
             first = hazard.description if right else _text(chance)[1]
             texts = [first, _text(chance)[1]] if chance.random() < 0.3 else [first]
             rows += [Prediction(hazard.video_id, rank, text) for rank, text in enumerate(texts, start=1)]
         submissions.append(Submission(f"System {number + 1}", "", "", "2026-01-01", "csv", tuple(rows)))
+    return submissions
+
+
+def made_board(
+    submissions: list[Submission], truth: list[TruthHazard], *, with_probes: bool
+) -> list[Standing]:
+    """The submissions with their scores; probes take long when there are many videos."""
     embedder, digest = open_embedder(), truth_sha256(truth)
     vectors = embed_all(texts_of(submissions, truth), embedder)
-    probes = probe_board(submissions, truth, vectors, 0.8)
+    probes = probe_board(submissions, truth, vectors, 0.8) if with_probes else [()] * len(submissions)
     nowhere = Path("nowhere")
     return [
         Standing(

@@ -10,7 +10,7 @@ Each file calls `COOOLER_FAILURES(name, value)`, where name is its path without 
 and hazards are known by their place, texts by their place within the system, from 1.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import Any, NamedTuple
@@ -21,11 +21,10 @@ from sitegen.failures import Blame, Failure, FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData, System
 from sitegen.language import N_, marked
 from sitegen.language import gettext as _
+from sitegen.data_shards import Shards
 from sitegen.words import shorten, visible
 
 INDEX_FILE = "data/failures.js"
-BLOCK = 100
-SHARD_BYTES = 10 * 1024
 UNITS = 10_000
 """Similarities are whole numbers of this part: the four digits that the page prints."""
 
@@ -50,7 +49,7 @@ STAGES: dict[str, str] = {"known": N_("Stages recorded"), "unknown": N_("Stages 
 NO_LABEL = N_("Without a label")
 NOT_A_HAZARD = N_("None: a caption’s failure")
 
-_CALL_BYTES = 200  # at most, around the value of a shard
+_SHARDS = Shards("COOOLER_FAILURES", "failures")
 _KINDS = tuple(FailureKind)
 _SIZES = tuple(SIZES)
 
@@ -176,8 +175,8 @@ def failure_files(data: SiteData, blames: Mapping[str, Blame]) -> Iterator[tuple
     hazards = [_hazard(row, places, codes) for row in found.hazards]
     of_videos = list(range(len(videos)))
     of_hazards = [places[row.video_id] for row in found.hazards]
-    yield from _shards("videos", videos, of_videos, ends["videos"])
-    yield from _shards("hazards", hazards, of_hazards, ends["hazards"])
+    yield from _SHARDS.cut("videos", videos, of_videos, ends["videos"])
+    yield from _SHARDS.cut("hazards", hazards, of_hazards, ends["hazards"])
     numbers = {(row.video_id, row.hazard_id): n for n, row in enumerate(found.hazards, start=1)}
     systems: list[Any] = []
     for system, failures in zip(found.systems, found.failures, strict=True):
@@ -185,9 +184,9 @@ def failure_files(data: SiteData, blames: Mapping[str, Blame]) -> Iterator[tuple
         rows = [_row(system, failure, places, numbers, texts) for failure in failures]
         of_system: tuple[list[int], list[int]] = ([], [])
         of_rows = [places[failure.video_id] for failure in failures]
-        yield from _shards(f"rows/{system.slug}", rows, of_rows, of_system[0])
+        yield from _SHARDS.cut(f"rows/{system.slug}", rows, of_rows, of_system[0])
         written = [script_json(text) for text in texts]
-        yield from _shards(f"texts/{system.slug}", written, [0] * len(texts), of_system[1])
+        yield from _SHARDS.cut(f"texts/{system.slug}", written, [0] * len(texts), of_system[1])
         systems.append([system.slug, system_name(system), *of_system])
     index |= {**ends, "systems": systems}
     yield INDEX_FILE, f'COOOLER_FAILURES("failures",{script_json(index)});\n'.encode()
@@ -244,25 +243,3 @@ def _row(
             evidence,
         ]
     )
-
-
-def _shards(
-    name: str, entries: Sequence[str], videos: Sequence[int], ends: list[int]
-) -> Iterator[tuple[str, bytes]]:
-    """Entries in order as files of at most SHARD_BYTES and BLOCK videos; `ends` gets where each ends."""
-    start, size = 0, _CALL_BYTES
-    for place, entry in enumerate(entries):
-        full = size + len(entry) + 1 > SHARD_BYTES
-        if place > start and (full or videos[place] // BLOCK != videos[place - 1] // BLOCK):
-            yield _file(f"{name}/{len(ends)}", entries[start:place])
-            ends.append(place)
-            start, size = place, _CALL_BYTES
-        size += len(entry) + 1
-    if len(entries) > start:
-        yield _file(f"{name}/{len(ends)}", entries[start:])
-        ends.append(len(entries))
-
-
-def _file(name: str, entries: Sequence[str]) -> tuple[str, bytes]:
-    content = f'COOOLER_FAILURES("failures/{name}",[{",".join(entries)}]);\n'
-    return f"data/failures/{name}.js", content.encode()

@@ -226,10 +226,11 @@ def _coarse(system: System) -> list[int]:
 
 def cards(data: SiteData, limit: int | None = None) -> tuple[VideoCard, ...]:
     """A card a video, in the order of their ids; the first `limit` only, where one is given."""
-    return tuple(_card(data, video_id) for video_id in data.video_ids[:limit])
+    return tuple(video_card(data, video_id) for video_id in data.video_ids[:limit])
 
 
-def _card(data: SiteData, video_id: str) -> VideoCard:
+def video_card(data: SiteData, video_id: str) -> VideoCard:
+    """The card of a video; with a hidden truth it tells no more than the id."""
     media = data.media[video_id]
     length = seconds(media.frame_count / media.fps_hz) if media.fps_hz else ""
     shape = (media.height_px / media.width_px) if media.width_px else 9 / 16
@@ -254,6 +255,19 @@ def _card(data: SiteData, video_id: str) -> VideoCard:
     return card if data.hidden else _judged_card(data, video_id, card)
 
 
+def found_by(data: SiteData, video_id: str) -> int:
+    """How many systems detected a video's hazard, or were rightly silent."""
+    return sum(_good(system.scores[video_id]) for system in data.systems)
+
+
+def state_of(data: SiteData, video_id: str) -> str:
+    """A video's state as VideoCard has it."""
+    if all(hazard.is_no_hazard for hazard in data.truth[video_id]):
+        return "clear"
+    found = found_by(data, video_id)
+    return "missed" if not found else "found" if found == len(data.systems) else "partly"
+
+
 def _judged_card(data: SiteData, video_id: str, card: VideoCard) -> VideoCard:
     """The card with the truth and how many systems met it."""
     truth = data.truth[video_id]
@@ -263,13 +277,9 @@ def _judged_card(data: SiteData, video_id: str, card: VideoCard) -> VideoCard:
     if ranked and hazards:
         video = ranked[0].scores[video_id]
         best = score(video.best, video.detected, digits=2)
-    found = sum(_good(system.scores[video_id]) for system in data.systems)
+    found, state = found_by(data, video_id), state_of(data, video_id)
     labels = visible(title_of(truth))
-    if not hazards:
-        state, words = "clear", _("{n} of {total} rightly silent")
-    else:
-        state = "missed" if not found else "found" if found == len(data.systems) else "partly"
-        words = _("{n} of {total} detected it")
+    words = _("{n} of {total} rightly silent") if state == "clear" else _("{n} of {total} detected it")
     descriptions = tuple(visible(hazard.description) for hazard in hazards)
     return replace(
         card,

@@ -26,6 +26,9 @@ from sitegen.numerals import Score, number, plural, score
 from sitegen.words import shorten
 
 FIRST = 50
+LARGE = 5_000
+"""Of more failures than this, the page loads the data only when it is asked to: it is megabytes."""
+
 CHARTS, MORE_CHARTS = 3, 9
 """So many systems have their funnel drawn in sight, and so many more when asked; the table has all."""
 
@@ -113,7 +116,10 @@ class FirstFailure:
 
 @dataclass(frozen=True, slots=True)
 class FailuresPage:
-    """failures.html; `index_file` is empty when there is no failure, `systems` when there is no blame."""
+    """failures.html; `index_file` is empty when there is no failure, `systems` when there is no blame.
+
+    `is_large` says that the gallery's data are loaded only when they are asked for.
+    """
 
     shell: Shell
     index_file: str
@@ -127,6 +133,7 @@ class FailuresPage:
     more_funnels: tuple[Funnel, ...]
     first: tuple[FirstFailure, ...]
     more: str
+    is_large: bool
 
 
 def failures_page(data: SiteData, blames: Mapping[str, Blame], shell: Shell) -> FailuresPage:
@@ -165,6 +172,7 @@ def failures_page(data: SiteData, blames: Mapping[str, Blame], shell: Shell) -> 
         more=plural(total - len(first), "{n} more failure", "{n} more failures")
         if total > len(first)
         else "",
+        is_large=total > LARGE,
     )
 
 

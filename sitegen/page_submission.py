@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import partial
 
 from pipeline.records import UsageRow
 from sitegen.contexts import Fact, Shell
@@ -9,13 +10,17 @@ from sitegen.failures import FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData, System
 from sitegen.language import N_, fixed, grouped, ngettext, said_again, whole
 from sitegen.language import gettext as _
+from sitegen.listing import ALL, Group, Listing, ListPage, pages_of
 from sitegen.numerals import percent, plural, score
+from sitegen.page_videos import span_of
+from sitegen.pager import Pager, pager
 from sitegen.probes import Probe
 from sitegen.submission_contexts import (
     Extreme,
     JudgedLine,
     KindCount,
     ProbeLine,
+    SubmissionLines,
     SubmissionPage,
     VideoLine,
 )
@@ -34,8 +39,10 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
     submission = system.evaluation.submission
     best, worst = ((), ()) if data.hidden else _extremes(data, system)
     flagged = sum(probe.flagged for probe in system.probes)
+    first = submission_parts(data)[0]
     return SubmissionPage(
         shell=shell,
+        slug=system.slug,
         name=visible(system.name),
         agents=visible(said_again(system.agents)),
         is_baseline=system.is_baseline,
@@ -49,7 +56,7 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
         if flagged
         else _("No probe speaks"),
         failures=_failures(system),
-        lines=tuple(_line(data, system, video_id) for video_id in data.video_ids),
+        lines=tuple(_line(data, system, video_id) for video_id in first.video_ids),
         best=best,
         worst=worst,
         provenance=_provenance(system),
@@ -57,7 +64,36 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
         warnings=tuple(visible(warning) for warning in submission.warnings),
         signature=str(system.evaluation.card.signature),
         threshold=fixed(data.settings.threshold, 2),
+        pager=_pager(system, first) if first.listing.pages > 1 else None,
+        span=span_of(first),
     )
+
+
+def submission_parts(data: SiteData) -> tuple[ListPage, ...]:
+    """The videos as a submission's pages have them, by id."""
+    return tuple(pages_of(Listing(ALL, (Group("", data.video_ids),))))
+
+
+def submission_lines(data: SiteData, system: System, page: ListPage, shell: Shell) -> SubmissionLines:
+    """The context of submissions/<slug>/<n>.html."""
+    return SubmissionLines(
+        shell=shell,
+        slug=system.slug,
+        name=visible(system.name),
+        hidden=data.hidden,
+        lines=tuple(_line(data, system, video_id) for video_id in page.video_ids),
+        pager=_pager(system, page),
+        span=span_of(page),
+    )
+
+
+def _pager(system: System, page: ListPage) -> Pager:
+    return pager(page.number, page.listing.pages, partial(submission_path, system.slug))
+
+
+def submission_path(slug: str, number: int = 1) -> str:
+    """The path of a submission's page."""
+    return f"submissions/{slug}.html" if number == 1 else f"submissions/{slug}/{number}.html"
 
 
 def _failures(system: System) -> tuple[KindCount, ...]:

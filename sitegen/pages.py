@@ -15,7 +15,7 @@ from sitegen.exports import FORMATS
 from sitegen.failure_files import failure_files
 from sitegen.failures import Blame
 from sitegen.gathered import SiteData, System
-from sitegen.language import ENGLISH, ngettext, speaking
+from sitegen.language import ENGLISH, ngettext, speaking, whole
 from sitegen.language import gettext as _
 from sitegen.narrowed import of_video
 from sitegen.page_board import leaderboard_page, video_href, videos_page
@@ -25,12 +25,13 @@ from sitegen.page_failures import FailuresPage, failures_page
 from sitegen.page_method import method_page
 from sitegen.page_restoration import PATH as RESTORATION
 from sitegen.page_restoration import RestorationPage, restoration_files, restoration_page
-from sitegen.page_submission import submission_page
+from sitegen.page_submission import submission_lines, submission_page, submission_parts, submission_path
 from sitegen.page_submit import SubmitPage, submit_files, submit_page
 from sitegen.page_video import Place, video_page
+from sitegen.page_videos import VideoListPage, is_long, list_files, list_pages
 from sitegen.page_vote import VotePage, vote_files, vote_page
 from sitegen.spreads import spreads
-from sitegen.submission_contexts import SubmissionPage
+from sitegen.submission_contexts import SubmissionLines, SubmissionPage
 from sitegen.transcript import transcript
 from sitegen.verdicts import title_of
 from sitegen.video_contexts import VideoPage
@@ -39,8 +40,10 @@ from sitegen.words import shorten, visible
 Context: TypeAlias = (
     LeaderboardPage
     | VideosPage
+    | VideoListPage
     | VideoPage
     | SubmissionPage
+    | SubmissionLines
     | FailuresPage
     | ComparePage
     | SubmitPage
@@ -80,16 +83,28 @@ def make_pages(data: SiteData) -> Iterator[Page]:
     yield Page("index.html", "leaderboard.html", made)
     about = _("All {n} videos.") if data.hidden else _("All {n} videos with their hazards.")
     shell = _shell(data, _("Videos"), about.format(n=len(data.truth)), "", "videos")
-    yield Page("videos.html", "videos.html", partial(videos_page, data, shell))
+    if is_long(data):
+        for path, listed in list_pages(data, partial(_list_shell, data)):
+            yield Page(path, "video_list.html", listed)
+    else:
+        yield Page("videos.html", "videos.html", partial(videos_page, data, shell))
     yield from _video_pages(data)
+    more = submission_parts(data)[1:]
     for system in data.systems:
         about = _("{system}: scores, every video, provenance.").format(system=visible(system.name))
         shell = _shell(data, visible(system.name), about, "../", "leaderboard")
         yield Page(
-            f"submissions/{system.slug}.html",
+            submission_path(system.slug),
             "submission.html",
             partial(submission_page, data, system, shell),
         )
+        for rest in more:
+            title = _("{title}, page {n} of {pages}").format(
+                title=visible(system.name), n=whole(rest.number), pages=whole(rest.listing.pages)
+            )
+            shell = _shell(data, title, about, "../../", "leaderboard")
+            made_lines = partial(submission_lines, data, system, rest, shell)
+            yield Page(submission_path(system.slug, rest.number), "submission_lines.html", made_lines)
     if not data.hidden:
         about = _("Every hazard that a system missed, where it was lost, and every wrong caption.")
         shell = _shell(data, _("Failures"), about, "", "failures")
@@ -159,6 +174,7 @@ def data_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
         yield from compare_files(data)
         yield from failure_files(data, _blames(data))
     yield from board_files(data)
+    yield from list_files(data)
     yield from restoration_files(data)
     if not data.systems:
         return
@@ -180,6 +196,10 @@ def _point(system: System) -> charts.Point:
     card, sure = system.evaluation.card, system.uncertainty
     besm, sam = (sure.besm.low, sure.besm.high), (sure.sam.low, sure.sam.high)
     return charts.Point(system.name, card.besm, card.sam, card.detection_rate, besm, sam)
+
+
+def _list_shell(data: SiteData, title: str, description: str, root: str) -> Shell:
+    return _shell(data, title, description, root, "videos")
 
 
 def _shell(data: SiteData, title: str, description: str, root: str, section: str) -> Shell:

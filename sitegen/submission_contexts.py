@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from sitegen.contexts import Fact, LedgerLine, Shell
 from sitegen.numerals import Score
+from sitegen.pager import Pager
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +66,13 @@ class KindCount:
 
 @dataclass(frozen=True, slots=True)
 class SubmissionPage:
-    """submissions/<slug>.html"""
+    """submissions/<slug>.html
+
+    Where one page cannot hold all videos, `pager` leads to the others and `span` says which are here.
+    """
 
     shell: Shell
+    slug: str
     name: str
     agents: str
     is_baseline: bool
@@ -87,3 +92,18 @@ class SubmissionPage:
     warnings: tuple[str, ...]
     signature: str
     threshold: str
+    pager: Pager | None
+    span: str
+
+
+@dataclass(frozen=True, slots=True)
+class SubmissionLines:
+    """submissions/<slug>/<n>.html: more of the videos, the first of which are on the submission's page."""
+
+    shell: Shell
+    slug: str
+    name: str
+    hidden: bool
+    lines: tuple[VideoLine, ...]
+    pager: Pager
+    span: str

@@ -273,3 +273,17 @@ def test_a_video_opened_from_a_filter_is_followed_by_the_others(context: Browser
     page.locator("#fail-clear").click()
     page.locator(".fail-link").first.click()
     assert page.evaluate("sessionStorage.getItem('coooler-walk')") is None
+
+
+def test_very_many_failures_come_when_they_are_asked_for(context: BrowserContext, tmp_path: Path) -> None:
+    root = write_page(*generated(160, 4, each=8), tmp_path).as_uri()  # 5,120 failures
+    page = context.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(f"{root}/failures.html", wait_until="networkidle")
+    assert not any("/data/" in address for address in asked)
+    assert page.locator("#fail-first").is_visible()
+    page.locator("#fail-load").click()
+    done(page)
+    assert shown_count(page) == 5_120 and not page.locator("#fail-load").is_visible()
+    assert opened(context, root, "?sort=low").locator("#fail-sort").input_value() == "low"
