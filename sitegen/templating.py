@@ -1,7 +1,13 @@
-"""How values and messages get into templates: jinja2's escaping and newstyle gettext, with less done a value."""
+"""How values and messages get into pages: jinja2's escaping and newstyle gettext, with less done for each.
+
+Templates are compiled so that a name after a dot is an attribute and nothing else, that what is called is
+called with what stands in the brackets (jinja's `pass_context` and its like are not known), and that text is
+copied only where it has something to escape.
+"""
 
 import operator
 from functools import lru_cache
+from typing import Any
 
 from jinja2 import Environment
 from jinja2.compiler import CodeGenerator, Frame
@@ -59,20 +65,24 @@ class _Code(CodeGenerator):
         else:
             self.write("environment.shown(")
 
-    def visit_Call(self, node: Call, frame: Frame, forward_caller: bool = False) -> None:
+    def visit_Call(  # noqa: N802 - jinja's names
+        self, node: Call, frame: Frame, forward_caller: bool = False
+    ) -> None:
+        """A call without jinja's context in between."""
         self.write("environment.call(")
         self.visit(node.node, frame)
         self.signature(node, frame, {"caller": "caller"} if forward_caller else None)
         self.write(")")
 
-    def visit_Getattr(self, node: Getattr, frame: Frame) -> None:
+    def visit_Getattr(self, node: Getattr, frame: Frame) -> None:  # noqa: N802
+        """Python's attribute, never an item."""
         self.visit(node.node, frame)
         self.write(f".{node.attr}")
 
 
 class Pages(Environment):
-    """An environment for pages."""
+    """An environment whose templates are compiled so; everything in them is escaped."""
 
     code_generator_class = _Code
     shown = staticmethod(shown)
-    call = staticmethod(operator.call)
+    call: Any = operator.call
