@@ -37,6 +37,11 @@ def speaking(language: Language) -> Iterator[None]:
         _spoken.reset(before)
 
 
+def speak(language: Language) -> None:
+    """From now on this thread's pages are in `language`; for processes that make nothing else."""
+    _spoken.set(language)
+
+
 def spoken() -> Language:
     """The language of the pages that are being made."""
     return _spoken.get()
