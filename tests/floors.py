@@ -121,6 +121,7 @@ FLOORS = [
         "sitegen.manifest",
         "sitegen.numerals",
         "sitegen.serve",
+        "sitegen.templating",
     ],
     [
         "sitegen.about",
@@ -238,17 +239,20 @@ FLOORS = [
     ],
     [
         "sitegen.annotate_pages",
-        "sitegen.build",
         "sitegen.intake_pages",
+        "sitegen.rendering_pool",
         "sitegen.scaffold",
         "sitegen.strict",
     ],
     [
         "sitegen.annotate_app",
-        "sitegen.board",
+        "sitegen.build",
     ],
     [
         "sitegen.annotate_server",
+        "sitegen.board",
+    ],
+    [
         "sitegen.cli_common",
         "sitegen.demo",
         "sitegen.intake_worker",
