@@ -4,7 +4,6 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +21,9 @@ from sitegen.language import ENGLISH, speaking
 from sitegen.manifest import Content
 from sitegen.media import MadeMedia, MediaJob, MediaSettings, make_media, media_from_json, media_to_json
 from sitegen.output import Output, open_output
-from sitegen.pages import data_files, make_pages
+from sitegen.pages import Page, data_files, make_pages
 from sitegen.rendering import code_sha256, find_locale, find_templates, render
+from sitegen.rendering_pool import rendered
 from sitegen.standings import Standing
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def build_site(
         clips = {job.video_id: job.clip_sha256 for job in todo}
         data = replace(data, check=stored_check(benchmark.root, inputs_of(rows, benchmark.boxes, clips)))
     inputs = sha256_of(f"{code_sha256()} {embedder.sha256 if embedder else ''} {data!r}".encode())
-    digest = output.before.tree if output.keep_all(inputs) else put_pages(output, data, embedder, tell)
+    digest = output.before.tree if output.keep_all(inputs) else put_pages(output, data, embedder, tell, jobs)
     output.finish(digest, remembered, inputs, contents)
     if data.hidden:
         _nothing_left(output)
@@ -101,7 +101,7 @@ def build_site(
     return BuildReport(out, output.written, output.unchanged, output.removed, decoded, digest, size)
 
 
-def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: Tell) -> str:
+def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: Tell, jobs: int = 1) -> str:
     """Put all of a site but its pictures, which are there, into `output`; give the tree's hash."""
     code = code_sha256()
     output.add_all(_assets(with_charts=bool(data.systems)))
@@ -111,10 +111,21 @@ def put_pages(output: Output, data: SiteData, embedder: Embedder | None, tell: T
         if embedder and not data.hidden:
             data = _with_blame(data, embedder)
         output.add_all(data_files(data))
-        for done, page in enumerate(make_pages(data), start=1):
-            key = page.shows and sha256_of(f"{page.shows} {data.settings.address} {code}".encode())
-            output.add_page(page.path, key, partial(render, page, data.settings.address))
-            tell("Rendering pages", done, total)
+        keys: dict[str, str] = {}
+
+        def changed() -> Iterator[Page]:
+            """The pages that are not there as they should be."""
+            for page in make_pages(data):
+                key = page.shows and sha256_of(f"{page.shows} {data.settings.address} {code}".encode())
+                if output.keep_page(page.path, key):
+                    tell("Rendering pages", len(output.pages), total)
+                else:
+                    keys[page.path] = key
+                    yield page
+
+        for page, blank in rendered(changed(), data.settings.address, language, jobs, render):
+            output.put_page(page.path, keys.pop(page.path), blank)
+            tell("Rendering pages", len(output.pages), total)
     if language != ENGLISH.tag:
         messages = script_json(script_messages(language, find_locale()))
         output.add_all([(CATALOGUE, f"window.COOOLER_CATALOGUE = {messages};\n".encode())])

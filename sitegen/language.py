@@ -37,6 +37,11 @@ def speaking(language: Language) -> Iterator[None]:
         _spoken.reset(before)
 
 
+def speak(language: Language) -> None:
+    """From now on this thread's pages are in `language`; for processes that make nothing else."""
+    _spoken.set(language)
+
+
 def spoken() -> Language:
     """The language of the pages that are being made."""
     return _spoken.get()
@@ -44,7 +49,8 @@ def spoken() -> Language:
 
 def gettext(message: str) -> str:
     """The message in the language of the page; as it is where the catalogue has none."""
-    return _spoken.get().messages.gettext(message) if message else ""
+    language = _spoken.get()
+    return message if language is ENGLISH else language.messages.gettext(message) if message else ""
 
 
 def ngettext(one: str, many: str, count: int) -> str:
@@ -100,4 +106,6 @@ def fixed(value: float, digits: int) -> str:
 def marked(text: str) -> str:
     """A number as Python writes it, with the marks of the page's language."""
     language = _spoken.get()
+    if language is ENGLISH:
+        return text
     return text.translate({ord("."): language.decimal_mark, ord(","): language.group_mark})

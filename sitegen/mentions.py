@@ -7,7 +7,7 @@ and recall 49/53. They were chosen for all-MiniLM-L6-v2; another embedder may wa
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from itertools import product
 from typing import NamedTuple, TypeAlias
 
@@ -17,8 +17,8 @@ from pipeline.interfaces import Embedder
 from sitegen.evaluate import embed_all
 from sitegen.language import N_, fixed
 from sitegen.language import gettext as _
-from sitegen.phrase_cache import phrases_of
-from sitegen.phrases import Phrase, lemmas, nouns, sentences, topics
+from sitegen.phrase_cache import phrases_of, topics_of
+from sitegen.phrases import Phrase, lemmas, nouns, sentences
 from sitegen.score import Real
 
 NEAR = 0.76
@@ -128,14 +128,11 @@ def related(one: str, other: str) -> bool | None:
     return any(a[: len(b)] == b or b[: len(a)] == a for a in ours for b in theirs)
 
 
-@lru_cache(maxsize=4096)
-def keys(label: str, description: str) -> tuple[Phrase, ...]:
-    """The phrases that name a hazard: its label's, and what its description is about.
+def _keys(named: Sequence[Phrase], told: Sequence[Phrase]) -> tuple[Phrase, ...]:
+    """The phrases that name a hazard: its label's, and what its description is about (`topics` of each).
 
     The surroundings ("The road suddenly goes dark") name no hazard that has a label.
     """
-    named = topics(label)
-    told = topics(description)
     return tuple(
         dict.fromkeys([*named, *(phrase for phrase in told if not named or phrase.head not in _BACKGROUND)])
     )
@@ -149,6 +146,7 @@ class Mentions:
         self._embedder = embedder
         self._units: dict[str, Real] = {}
         self._phrases: dict[str, tuple[Phrase, ...]] = {}
+        self._topics: dict[str, tuple[Phrase, ...]] = {}
 
     def first(self, questions: Sequence[Question]) -> list[Mention | None]:
         """The first mention of each question's hazard, or None; the same words win over the same kind,
@@ -159,7 +157,9 @@ class Mentions:
         """
         if not questions:
             return []
-        wanted = [keys(question.label, question.description) for question in questions]
+        texts = dict.fromkeys(text for one in questions for text in (one.label, one.description))
+        self._topics |= topics_of([text for text in texts if text not in self._topics])
+        wanted = [_keys(self._topics[one.label], self._topics[one.description]) for one in questions]
         split = [
             [(number, said) for number, text in enumerate(question.texts) for said in sentences(text)]
             for question in questions

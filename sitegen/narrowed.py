@@ -7,6 +7,7 @@ from itertools import takewhile
 from pipeline.scores import Evaluation, Scorecard, Signature, Submission
 from sitegen.failures import Blame, Failure
 from sitegen.gathered import SiteData, System
+from sitegen.language import said_again
 from sitegen.restoration import Restorations
 from sitegen.uncertainty import Interval, Uncertainty
 
@@ -44,7 +45,7 @@ def _system(system: System, video_id: str) -> System:
         0,
         0,
         system.slug,
-        system.agents,
+        said_again(system.agents),  # a worker process gets it as plain text
         system.is_baseline,
         Evaluation(Submission(system.name, "", "", "", "", said), pairs, (score,) if score else (), _NO_CARD),
         _UNSURE,

@@ -53,5 +53,4 @@ def seconds(value: float) -> str:
 
 def number(value: float) -> str:
     """A coordinate for an SVG attribute: at most one digit after the point."""
-    text = f"{value:.1f}"
-    return text[:-2] if text.endswith(".0") else text
+    return f"{value:.1f}".removesuffix(".0")

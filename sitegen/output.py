@@ -86,12 +86,21 @@ class Output:
         `key` is the hash of all that the page shows, empty when that is not known. `make` gives it
         with an empty place for the tree's hash. Raises ValueError when it has not one such place.
         """
+        if not self.keep_page(path, key):
+            self.put_page(path, key, make())
+
+    def keep_page(self, path: str, key: str) -> bool:
+        """Whether the page of before shows the same and is still there; it is then added as it is."""
         known = self.before.files.get(path)
-        if key and known and self.before.pages.get(path) == key and self._page_is_there(path, *known):
-            self._claim(path, *known)
-            self.pages[path] = key
-            return
-        blank = make()
+        if not (key and known and self.before.pages.get(path) == key and self._page_is_there(path, *known)):
+            return False
+        self._claim(path, *known)
+        self.pages[path] = key
+        return True
+
+    def put_page(self, path: str, key: str, blank: bytes) -> None:
+        """Put a page that was made; for `add_page`, and for pages that are made elsewhere."""
+        known = self.before.files.get(path)
         if blank.count(BLANK) != 1:
             raise ValueError(f"found {blank.count(BLANK)} places for the tree's hash in a page; expected 1")
         digest, size = sha256_of(blank), len(blank) + _STAMP_BYTES

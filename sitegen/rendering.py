@@ -4,12 +4,13 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import FileSystemLoader, StrictUndefined
 
 from pipeline.errors import OutsideError
 from pipeline.files import sha256_file, sha256_of
-from sitegen.language import gettext, marked, ngettext, whole
+from sitegen.language import marked, whole
 from sitegen.pages import Page
+from sitegen.templating import Pages, counted, said
 
 _CODE = {".css", ".html", ".js", ".po", ".py", ".svg", ".toml"}
 
@@ -32,9 +33,9 @@ def find_locale() -> Path:
 
 
 @cache
-def environment() -> Environment:
+def environment() -> Pages:
     """The jinja environment: everything escaped, an undefined name is an error; one a process."""
-    made = Environment(
+    made = Pages(
         loader=FileSystemLoader(find_templates()),
         autoescape=True,
         undefined=StrictUndefined,
@@ -43,7 +44,8 @@ def environment() -> Environment:
         keep_trailing_newline=True,
         extensions=["jinja2.ext.i18n"],
     )
-    made.install_gettext_callables(gettext, ngettext, newstyle=True)  # type: ignore[attr-defined]
+    made.newstyle_gettext = True  # type: ignore[attr-defined]
+    made.globals |= {"_": said, "gettext": said, "ngettext": counted}
     made.filters |= {"marked": marked, "whole": whole}
     return made
 

@@ -15,14 +15,19 @@ def snippet_pictures(media: VideoMedia, snippets: Iterable[Snippet]) -> dict[Pla
     """
     thumbs = {frame.index: frame.thumb for frame in media.frames}
     pictures: dict[Place, Picture] = {}
+    right, bottom = float(media.width_px), float(media.height_px)
     for snippet in snippets:
-        place = snippet.track_box.track_id, snippet.track_box.frame_index
-        box = snippet.track_box.box
-        x1, x2 = (min(max(x, 0.0), float(media.width_px)) for x in (box.x1_px, box.x2_px))
-        y1, y2 = (min(max(y, 0.0), float(media.height_px)) for y in (box.y1_px, box.y2_px))
-        if place[1] in thumbs and x2 - x1 >= 1 and y2 - y1 >= 1:
-            view = " ".join(map(number, (x1, y1, x2 - x1, y2 - y1)))
-            pictures[place] = Picture(thumbs[place[1]], media.width_px, media.height_px, view)
+        track_box = snippet.track_box
+        thumb = thumbs.get(track_box.frame_index)
+        if thumb is None:
+            continue
+        box = track_box.box
+        x1, x2 = min(max(box.x1_px, 0.0), right), min(max(box.x2_px, 0.0), right)
+        y1, y2 = min(max(box.y1_px, 0.0), bottom), min(max(box.y2_px, 0.0), bottom)
+        if x2 - x1 >= 1 and y2 - y1 >= 1:
+            view = f"{number(x1)} {number(y1)} {number(x2 - x1)} {number(y2 - y1)}"
+            picture = Picture(thumb, media.width_px, media.height_px, view)
+            pictures[track_box.track_id, track_box.frame_index] = picture
     for crop in media.crops:
         pictures[crop.track_id, crop.frame_index] = Picture(
             crop.path, crop.picture_width_px, crop.picture_height_px

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
 from pipeline.records import Exclusion, Kind, Match, Parse, Snippet, Stage, StageOutput, TrackBox
-from sitegen.figure2 import figure2
-from sitegen.gathered import System, VideoMedia
+from sitegen.figure2 import Figure2, figure2
+from sitegen.gathered import Records, System, VideoMedia
 from sitegen.language import N_, whole
 from sitegen.language import gettext as _
 from sitegen.numerals import plural, score
@@ -50,11 +50,10 @@ def transcript(
     if not (records.stages or records.snippets or error):
         return None
     hazards = {box.track_id for box in boxes if box.kind is Kind.CHALLENGE}
-    stages = tuple(
-        _stage(stage, [output for output in records.stages if output.stage is stage])
-        for stage in STAGES
-        if any(output.stage is stage for output in records.stages)
-    )
+    by_stage: dict[Stage, list[StageOutput]] = {}
+    for output in records.stages:
+        by_stage.setdefault(output.stage, []).append(output)
+    stages = tuple(_stage(stage, by_stage[stage]) for stage in STAGES if stage in by_stage)
     proposed = {s.track_box.track_id for s in records.snippets if s.track_box.kind is Kind.PROPOSED}
     tracks = _tracks(records.snippets, records.matches, hazards, proposed)
     counted = sum(snippet.excluded is None for snippet in records.snippets)
@@ -72,8 +71,20 @@ def transcript(
         tracks,
         _tracks_summary(records.snippets),
         visible(error),
-        figure2(records.stages, records.snippets, records.matches, snippet_pictures(media, records.snippets)),
+        _figure(records, media),
     )
+
+
+def _figure(records: Records, media: VideoMedia) -> Figure2 | None:
+    """The paper's figure 2; of the snippets that nothing was compared with, no picture is needed."""
+    compared = {(match.track_id, match.frame_index) for match in records.matches}
+    snippets = [
+        snippet
+        for snippet in records.snippets
+        if (snippet.track_box.track_id, snippet.track_box.frame_index) in compared
+    ]
+    pictures = snippet_pictures(media, snippets)
+    return figure2(records.stages, records.snippets, records.matches, pictures)
 
 
 def _stage(stage: Stage, outputs: Sequence[StageOutput]) -> StageView:
@@ -87,9 +98,7 @@ def _stage(stage: Stage, outputs: Sequence[StageOutput]) -> StageView:
         visible(", ".join(models)),
         visible(", ".join(prompts)),
         _calls(len(outputs)),
-        tuple(
-            _saying(list(run)) for _, run in groupby(outputs, lambda o: (o.reply.text, o.items, str(o.parse)))
-        ),
+        tuple(_saying(list(run)) for _, run in groupby(outputs, lambda o: (o.reply.text, o.items, o.parse))),
     )
 
 
@@ -103,14 +112,16 @@ def _saying(run: Sequence[StageOutput]) -> Saying:
         where = _("call {n}").format(n=first.call + 1)
         if last.call != first.call:
             where = _("calls {first}–{last}").format(first=first.call + 1, last=last.call + 1)
+    reply = visible(shorten(first.reply.text, _MAX_REPLY))
+    said = first.items
+    if len(said) == 1:
+        spoken = first.reply.text.strip()
+        if not {said[0].label, said[0].description}.isdisjoint((spoken, spoken.rstrip("."))):
+            said = ()
     items = tuple(
         (visible(item.label), "" if item.description == item.label else visible(item.description))
-        for item in first.items
+        for item in said
     )
-    reply = visible(shorten(first.reply.text, _MAX_REPLY))
-    spoken = {first.reply.text.strip(), first.reply.text.strip().rstrip(".")}
-    if len(items) == 1 and {first.items[0].label, first.items[0].description} & spoken:
-        items = ()
     return Saying(where, f"×{len(run)}" if len(run) > 1 else "", items, reply, _(PARSES[first.parse]))
 
 

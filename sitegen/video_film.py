@@ -1,10 +1,9 @@
 """The film strip of a video's page: its keyframes, their boxes, and the tracks that can be switched."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from pipeline.records import Kind, TrackBox, TruthHazard
-from sitegen.gathered import KeyframePicture, VideoMedia
+from sitegen.gathered import VideoMedia
 from sitegen.language import N_
 from sitegen.language import gettext as _
 from sitegen.numerals import number, plural, seconds
@@ -22,38 +21,38 @@ def film(
     by_frame: dict[int, list[TrackBox]] = {}
     for box in boxes:
         by_frame.setdefault(box.frame_index, []).append(box)
-    frames = tuple(
-        _film_frame(media, place, picture, by_frame.get(picture.index, []), labels)
-        for place, picture in enumerate(media.frames)
-    )
-    return tuple(replace(frame, alt=_when(frame.index, frame.time)) for frame in frames) if hidden else frames
+    frames = []
+    for place, picture in enumerate(media.frames):
+        # Hazards last, so that they are drawn on top.
+        ordered = sorted(
+            by_frame.get(picture.index, ()), key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id)
+        )
+        time = seconds(picture.time_s)
+        when = _("Frame {n} at {time}").format(n=picture.index, time=time)
+        frames.append(
+            FilmFrame(
+                place + 1,
+                picture.index,
+                time,
+                picture.thumb,
+                picture.full,
+                when if hidden else f"{when}: {_boxes_text(ordered, labels) or _('no boxes')}",
+                tuple(_overlay(box, media) for box in ordered),
+                place == media.cover,
+            )
+        )
+    return tuple(frames)
 
 
-def _film_frame(
-    media: VideoMedia,
-    place: int,
-    picture: KeyframePicture,
-    boxes: Sequence[TrackBox],
-    labels: Mapping[str, str],
-) -> FilmFrame:
-    # Hazards last, so that they are drawn on top.
-    ordered = sorted(boxes, key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id))
-    seen = dict.fromkeys(box.track_id for box in ordered if box.kind is Kind.CHALLENGE)
+def _boxes_text(boxes: Sequence[TrackBox], labels: Mapping[str, str]) -> str:
+    """What the boxes of a frame are: hazard tracks by name, others by their number; empty without any."""
+    kinds = [box.kind for box in boxes]
+    seen = dict.fromkeys(box.track_id for box in boxes if box.kind is Kind.CHALLENGE)
     parts = [_("hazard track {track}").format(track=named_track(track, labels)) for track in seen]
-    proposed = sum(box.kind is Kind.PROPOSED for box in ordered)
+    proposed, others = kinds.count(Kind.PROPOSED), kinds.count(Kind.TRAFFIC)
     parts += [plural(proposed, "{n} proposed box", "{n} proposed boxes")] if proposed else []
-    others = sum(box.kind is Kind.TRAFFIC for box in ordered)
     parts += [plural(others, "{n} traffic box", "{n} traffic boxes")] if others else []
-    return FilmFrame(
-        place + 1,
-        picture.index,
-        seconds(picture.time_s),
-        picture.thumb,
-        picture.full,
-        f"{_when(picture.index, seconds(picture.time_s))}: {', '.join(parts) or _('no boxes')}",
-        tuple(_overlay(box, media) for box in ordered),
-        place == media.cover,
-    )
+    return ", ".join(parts)
 
 
 def track_labels(hazards: Sequence[TruthHazard]) -> dict[str, str]:
@@ -117,23 +116,21 @@ def tracks_text(tracks: Sequence[TrackChip], proposed_by: str = "") -> str:
     return _("{tracks}, {n} proposed").format(tracks=text, n=proposed) if proposed else text
 
 
-def _when(index: int, time: str) -> str:
-    return _("Frame {n} at {time}").format(n=index, time=time)
-
-
 def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:
-    x1, x2 = (min(max(value, 0.0), float(media.width_px)) for value in (box.box.x1_px, box.box.x2_px))
-    y1, y2 = (min(max(value, 0.0), float(media.height_px)) for value in (box.box.y1_px, box.box.y2_px))
+    right, bottom, corners = float(media.width_px), float(media.height_px), box.box
+    x1, x2 = min(max(corners.x1_px, 0.0), right), min(max(corners.x2_px, 0.0), right)
+    y1, y2 = min(max(corners.y1_px, 0.0), bottom), min(max(corners.y2_px, 0.0), bottom)
     size = label_px(media)
     text_y = y1 - size * 0.35 if y1 > size * 1.4 else y1 + size
+    track = visible(box.track_id)
     return OverlayBox(
         number(x1),
         number(y1),
         number(max(0.0, x2 - x1)),
         number(max(0.0, y2 - y1)),
         number(text_y),
-        visible(box.track_id),
-        shorten(visible(box.track_id), 16),
+        track,
+        shorten(track, 16),
         box.kind is Kind.CHALLENGE,
         box.kind is Kind.PROPOSED,
     )

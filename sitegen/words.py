@@ -49,7 +49,10 @@ def difference(truth: str, caption: str) -> Diff:
     old, new = _words(truth), _words(caption)
     if max(len(old), len(new)) > _MAX_DIFF_WORDS:
         return (("added", caption),)
-    matcher = SequenceMatcher(None, [w.casefold() for w in old], [w.casefold() for w in new], autojunk=False)
+    ours, theirs = [word.casefold() for word in old], [word.casefold() for word in new]
+    if ours == theirs:
+        return (("same", " ".join(new)),) if new else ()
+    matcher = SequenceMatcher(None, ours, theirs, autojunk=False)
     runs: list[tuple[str, str]] = []
     for tag, i1, i2, j1, j2 in matcher.get_opcodes():
         if tag == "equal":

@@ -124,6 +124,7 @@ FLOORS = [
         "sitegen.numerals",
         "sitegen.pager",
         "sitegen.serve",
+        "sitegen.templating",
     ],
     [
         "sitegen.about",
@@ -242,17 +243,20 @@ FLOORS = [
     ],
     [
         "sitegen.annotate_pages",
-        "sitegen.build",
         "sitegen.intake_pages",
+        "sitegen.rendering_pool",
         "sitegen.scaffold",
         "sitegen.strict",
     ],
     [
         "sitegen.annotate_app",
-        "sitegen.board",
+        "sitegen.build",
     ],
     [
         "sitegen.annotate_server",
+        "sitegen.board",
+    ],
+    [
         "sitegen.cli_common",
         "sitegen.demo",
         "sitegen.intake_worker",

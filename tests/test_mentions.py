@@ -260,3 +260,15 @@ def test_a_cache_that_cannot_be_made_does_no_harm(own_cache: Path, monkeypatch: 
     file.write_text("")
     monkeypatch.setattr(phrase_cache, "cache_folder", lambda: file / "folder")
     assert phrase_cache.phrases_of(["a red car"]) == phrases(["a red car"])
+
+
+def test_topics_are_kept_on_disk_and_are_those_of_the_parser(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts = ["a red car", "A deer crosses.\nThe road is dark", "a dog \ud800", ""]
+    expected = {text: parser.topics(text) for text in texts}
+    assert phrase_cache.topics_of(texts) == expected
+    asked: list[str] = []
+    monkeypatch.setattr(parser, "topics", lambda text: asked.append(text) or expected[text])
+    assert phrase_cache.topics_of(texts) == expected
+    assert asked == [text for text in texts if not text.isprintable()]

@@ -194,3 +194,18 @@ def test_a_kill_at_any_time_leaves_one_build_whole(tmp_path: Path, delay_s: floa
     open_output(tmp_path)
     found = {data for path, data in contents(tmp_path).items() if path.startswith("f")}
     assert len(found) == 1, "files of two builds"
+
+
+def test_a_page_is_kept_or_put(tmp_path: Path) -> None:
+    first = open_output(tmp_path)
+    assert not first.keep_page("a.html", "key")
+    first.put_page("a.html", "key", page("a"))
+    first.finish(first.stamp(), {}, "", {})
+    time.sleep(0.01)
+    again = open_output(tmp_path)
+    assert not again.keep_page("a.html", "other") and not again.keep_page("a.html", "") and not again.files
+    assert again.keep_page("a.html", "key") and again.pages == {"a.html": "key"}
+    with pytest.raises(ValueError, match="twice"):
+        again.put_page("a.html", "key", page("a"))
+    (tmp_path / "a.html").write_bytes(b"<p>changed</p>")
+    assert not open_output(tmp_path).keep_page("a.html", "key")
