@@ -35,7 +35,15 @@ Tell = Callable[[str, int, int], None]
 CATALOGUE = "assets/catalogue.js"
 PLOTLY = "assets/plotly.min.js"
 _FEW = 2  # starting processes costs more than this many clips
-_OURS = ("data", "media", "restored", "submissions", "videos")  # folders of a site that only a build fills
+# Folders of a site that only a build fills.
+_OURS = ("data", "list", "media", "restored", "submissions", "videos")
+    "data",
+    "list",
+    "media",
+    "restored",
+    "submissions",
+    "videos",
+)  # folders of a site that only a build fills
 
 
 @dataclass(frozen=True, slots=True)

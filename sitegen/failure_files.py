@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 from pipeline.records import TruthHazard
 from sitegen.charts import script_json
+from sitegen.data_shards import Shards
 from sitegen.failures import Blame, Failure, FailureKind, meaning_of, name_of
 from sitegen.gathered import SiteData, System
 from sitegen.language import N_, marked
 from sitegen.language import gettext as _
-from sitegen.data_shards import Shards
 from sitegen.words import shorten, visible
 
 INDEX_FILE = "data/failures.js"

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from sitegen.charts import script_json
 from sitegen.contexts import Link, Shell, VideoCard
+from sitegen.data_shards import Shards
 from sitegen.gathered import SiteData
 from sitegen.language import N_, fixed, whole
 from sitegen.language import gettext as _
@@ -31,7 +32,6 @@ from sitegen.listing import (
 from sitegen.numerals import plural
 from sitegen.page_board import found_by, state_of, video_card
 from sitegen.pager import Pager, pager
-from sitegen.data_shards import Shards
 from sitegen.words import shorten, visible
 
 INDEX_FILE = "data/videos.js"

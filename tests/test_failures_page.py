@@ -9,12 +9,12 @@ from typing import Any
 
 from pipeline.config import BenchmarkSettings
 from pipeline.records import Box, Kind, TrackBox, TruthHazard
+from sitegen.data_shards import SHARD_BYTES
 from sitegen.failure_files import failure_files, hazard_size, range_key, score_ranges
 from sitegen.failures import NAMES, SENTENCES, Blame, FailureKind
 from sitegen.gathered import SiteData, VideoMedia
 from sitegen.page_failures import failures_page
 from sitegen.rendering import environment
-from sitegen.data_shards import SHARD_BYTES
 from tests.failures_case import KINDS, ODD_ID, SHELL, generated
 
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sitegen.data_shards import BLOCK, SHARD_BYTES, Shards
 from sitegen.language import ENGLISH, speaking
 from sitegen.listing import PAGE, Group, Listing, by_label, numbers, pages_of, path_of, places_of
 from sitegen.page_submission import submission_parts
 from sitegen.page_videos import is_long, list_files, list_pages, listings
 from sitegen.pager import pager
 from sitegen.pages import make_pages
-from sitegen.data_shards import BLOCK, SHARD_BYTES, Shards
 from sitegen.strict import strict_faults
 from tests.many_case import made_data, make_site
 
