@@ -37,13 +37,6 @@ PLOTLY = "assets/plotly.min.js"
 _FEW = 2  # starting processes costs more than this many clips
 # Folders of a site that only a build fills.
 _OURS = ("data", "list", "media", "restored", "submissions", "videos")
-    "data",
-    "list",
-    "media",
-    "restored",
-    "submissions",
-    "videos",
-)  # folders of a site that only a build fills
 
 
 @dataclass(frozen=True, slots=True)
