@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from sitegen.scoreboard import BoardLine
 
 FileArgument = Annotated[
-    Path, typer.Argument(help="Predictions in any format that `check` knows, or a run folder.")
+    Path,
+    typer.Argument(
+        help="Predictions in any format that `check` knows, a folder of Parquet shards, or a run folder."
+    ),
 ]
 TruthOption = Annotated[
     Path | None, typer.Option(help="Truth: Parquet, CSV or JSON Lines. Default: the benchmark folder's.")
