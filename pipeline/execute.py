@@ -6,9 +6,9 @@ drawn as workers become free, and neither they nor results are kept: ten thousan
 memory than ten.
 """
 
+import copy
 import multiprocessing
 import os
-import pickle
 import re
 import socket
 import threading
@@ -166,9 +166,8 @@ class RayExecutor:
         Raises OutsideError when the cluster cannot be reached or is lost.
         """
 
-        def answer(item: T) -> bytes:
-            # Plain bytes are copied out of the object store; an array would be a view that fills it up.
-            return pickle.dumps(function(item), pickle.HIGHEST_PROTOCOL)
+        def answer(item: T) -> R:  # Ray takes no other callable than a function
+            return function(item)
 
         ray = self._ray
         ours = not ray.is_initialized()
@@ -222,7 +221,8 @@ class RayExecutor:
     def _result(self, reference: Any, item: T, lost: Callable[[T, str], R]) -> R:
         failures = self._ray.exceptions
         try:
-            result: R = pickle.loads(self._ray.get(reference))  # noqa: S301 (our own worker's)
+            # An array of it is a view into the object store, which would fill up: keep a copy.
+            result: R = copy.deepcopy(self._ray.get(reference))
         except failures.RayTaskError as error:
             raise error.cause from None
         except (
