@@ -11,7 +11,7 @@ import statistics
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
@@ -53,12 +53,13 @@ def small_clips(folder: Path) -> list[Path]:
     return made
 
 
-def write_benchmark(root: Path, clips: dict[str, Path], systems: int) -> Benchmark:
-    """A benchmark folder whose videos have these clips, and systems that are right ever less often."""
+def write_benchmark(root: Path, clips: Mapping[str, Path | None], systems: int) -> Benchmark:
+    """A benchmark folder whose videos have these clips, or none; systems are right ever less often."""
     (root / "videos").mkdir(parents=True)
     (root / "coooler.toml").write_text('name = "Rebuilds"\ntruth = "truth.parquet"\n', encoding="utf-8")
     for video_id, clip in clips.items():
-        os.link(clip, root / "videos" / f"{video_id}.mp4")
+        if clip:
+            os.link(clip, root / "videos" / f"{video_id}.mp4")
     chance = random.Random(0)  # noqa: S311
     texts = sentences(2 * len(clips))
     truth = [TruthHazard(one, "1", "car", text) for one, text in zip(clips, texts, strict=False)]
