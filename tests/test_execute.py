@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -63,10 +64,14 @@ def wait_long(number: int) -> None:
 
 
 RUN_FOR_EVER = """
+import signal
+
 from pipeline.execute import ProcessExecutor
 from tests.test_execute import lost, wait_long
 
 if __name__ == "__main__":
+    # Ignored where the tests run in the background, as with nohup; not in a terminal.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     list(ProcessExecutor(2).run(wait_long, range(2), lost))
 """
 
@@ -81,10 +86,14 @@ def test_however_a_run_ends_its_processes_end_with_it(by: signal.Signals, tmp_pa
         assert run.stdout is not None
         for _ in range(2):
             assert run.stdout.readline().strip().isdigit()  # both workers are at work
-        # As a terminal does: Ctrl-C goes to all of them.
-        (os.killpg if by is signal.SIGINT else os.kill)(run.pid, by)
-        # The pipe is at its end when no process holds it any more; it does not end by itself.
-        assert run.communicate(timeout=60)[0] == ""
+        try:
+            # As a terminal does: Ctrl-C goes to all of them.
+            (os.killpg if by is signal.SIGINT else os.kill)(run.pid, by)
+            # The pipe is at its end when no process holds it any more; it does not end by itself.
+            assert run.communicate(timeout=60)[0] == ""
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(run.pid, signal.SIGKILL)
 
 
 def fail(number: int) -> int:
