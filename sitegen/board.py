@@ -23,7 +23,7 @@ from sitegen.run_folder import extras_of, predictions_of, with_agents
 from sitegen.scoreboard import board_lines
 from sitegen.standings import Standing
 from sitegen.submissions import StoredSubmission, load_all, rescore, store
-from sitegen.untouched import Built, kept_truth, recall, remember, sources
+from sitegen.untouched import Built, kept_truth, only_noted, recall, remember, sources
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -160,7 +160,8 @@ def build_board(
     board of a day and notes nothing. One process at a time builds into a folder.
     """
     with locked(out):
-        return _build(benchmark, out, bar, as_of, today)
+        board, report, _ = _build(benchmark, out, bar, as_of, today)
+    return board, report
 
 
 def rebuild_board(
@@ -172,25 +173,32 @@ def rebuild_board(
         same = recall(benchmark, out, made_by, found)
         if same:
             return same
-        board, report = _build(benchmark, out, bar, as_of, today)
+        lines = len(ledger.read(benchmark.submissions))
+        board, report, noted = _build(benchmark, out, bar, as_of, today)
         last = [one.history[-1] for one in board if one.history]
         rescored = [f"{one.date}: {one.slug}: {one.reason}" for one in last if one.event == "rescore"]
         built = Built(board_lines([one.evaluation for one in board]), tuple(rescored), report)
+        now = sources(benchmark)
+        if only_noted(found, now) and len(ledger.read(benchmark.submissions)) == lines + len(noted):
+            found = now
         remember(benchmark, built, made_by, found)
     return built
 
 
 def _build(
     benchmark: Benchmark, out: Path, bar: "Progress | None", as_of: str, today: str
-) -> tuple[list[Standing], BuildReport]:
+) -> tuple[list[Standing], BuildReport, list[ledger.Entry]]:
+    """The board, what was built, and the new scores that were noted in the ledger."""
     board = evaluate_board(benchmark, as_of)
+    noted: list[ledger.Entry] = []
     if not as_of and board:
         _keep_truth(benchmark, read_truth(benchmark.truth))
         cards = {one.stored.slug: one.evaluation.card for one in board}
-        if rescore(benchmark.submissions, cards, today or FIRST_DAY):
+        noted = rescore(benchmark.submissions, cards, today or FIRST_DAY)
+        if noted:
             board = _histories(benchmark, board)
     then = as_it_was(benchmark, as_of) if as_of else benchmark
-    return board, build_site(then, out, board, bar, as_of=as_of, embedder=open_embedder())
+    return board, build_site(then, out, board, bar, as_of=as_of, embedder=open_embedder()), noted
 
 
 def _submission(sender: Sender, read: ReadPredictions) -> Submission:

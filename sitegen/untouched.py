@@ -15,12 +15,14 @@ from typing import Any
 from pipeline.benchmark import FILE_NAME, Benchmark
 from pipeline.files import sha256_of, write_text
 from pipeline.graphs import cache_folder
-from sitegen import data_check_run, votes
+from sitegen import data_check_run, ledger, votes
 from sitegen.build import BuildReport
 from sitegen.listings import Touch, listing, newest_ns, touch_of
 from sitegen.rendering import code_sha256
 from sitegen.scoreboard import BoardLine
 
+_SUBMISSIONS, _HISTORY = "submissions", "history"
+_LEDGER = f"{_SUBMISSIONS}/{ledger.FILE_NAME}"
 _TICK_S = 0.02  # what is younger than a few ticks of a file system's clock could change without a trace
 
 
@@ -54,11 +56,22 @@ def _sources(benchmark: Benchmark) -> dict[str, Touch]:
     root, attribution = benchmark.root, benchmark.settings.attribution
     files = [root / FILE_NAME, root / data_check_run.FILE_NAME, benchmark.truth, benchmark.boxes]
     files += [root / attribution] if attribution else []
-    folders = (benchmark.videos, benchmark.submissions, kept_truth(benchmark), root / votes.FOLDER)
+    folders = {
+        "videos": benchmark.videos,
+        _SUBMISSIONS: benchmark.submissions,
+        _HISTORY: kept_truth(benchmark),
+        "votes": root / votes.FOLDER,
+    }
     touches = {str(number): touch for number, path in enumerate(files) if (touch := touch_of(path))}
-    for number, folder in enumerate(folders):
-        touches |= {f"{number}/{path}": touch for path, touch in listing(folder).items()}
+    for name, folder in folders.items():
+        touches |= {f"{name}/{path}": touch for path, touch in listing(folder).items()}
     return touches
+
+
+def only_noted(before: Mapping[str, Touch], after: Mapping[str, Touch]) -> bool:
+    """Whether no other source was touched than those in which a build itself notes what it found."""
+    touched = {path for path in {*before, *after} if before.get(path) != after.get(path)}
+    return all(path == _LEDGER or path.startswith(f"{_HISTORY}/") for path in touched)
 
 
 def record(out: Path) -> Path:

@@ -17,6 +17,7 @@ from sitegen import board as board_module
 from sitegen.about import Sender
 from sitegen.board import build_board, rebuild_board, submit_file
 from sitegen.readers import read_truth
+from sitegen.submissions import withdraw
 from sitegen.untouched import Built, record, sources
 from tests.clips import write_clip
 from tests.site_fixtures import make_benchmark
@@ -141,6 +142,35 @@ def test_what_is_touched_is_looked_at(
     assert looked == [""]
     build_board(open_benchmark(folder / "b"), tmp_path / "fresh", today=DAY)
     assert contents(folder / "site") == contents(tmp_path / "fresh")
+
+
+def test_what_a_build_itself_noted_is_not_looked_at_again(folder: Path, looked: list[str]) -> None:
+    truth_row(folder)
+    first = build(folder)
+    ledger_file = folder / "b" / "submissions" / "ledger.jsonl"
+    assert first.rescored and b'"rescore"' in ledger_file.read_bytes()
+    looked.clear()
+    again = build(folder)
+    assert not looked and again.board == first.board and again.rescored == first.rescored
+    withdraw(open_benchmark(folder / "b").submissions, "One", "by mistake", DAY)
+    assert build(folder).board == () and looked == [""]
+
+
+def test_a_withdrawal_during_a_build_is_seen_by_the_next(
+    folder: Path, looked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    truth_row(folder)
+    real = board_module.build_site
+
+    def meanwhile(benchmark: Benchmark, *arguments: object, **options: object) -> object:
+        withdraw(benchmark.submissions, "One", "by mistake", DAY)
+        return real(benchmark, *arguments, **options)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(board_module, "build_site", meanwhile)
+        assert build(folder).board
+    looked.clear()
+    assert build(folder).board == () and looked == [""]
 
 
 def test_a_stored_file_edited_by_hand_is_refused(folder: Path) -> None:
