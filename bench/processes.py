@@ -23,7 +23,7 @@ def _run(*command: str) -> None:
 
 
 def measure() -> list[Measure]:
-    """Two rows: `--help`, and `score`, whose captions are embedded before the clock starts."""
+    """Three rows: `--help`, and `score`, whose captions are embedded before the clock starts."""
     coooler = str(Path(sys.executable).with_name("coooler"))
     with tempfile.TemporaryDirectory() as name:
         truth, predictions = Path(name) / "truth.parquet", Path(name) / "predictions.parquet"
@@ -35,6 +35,7 @@ def measure() -> list[Measure]:
             {
                 "help": partial(_run, coooler, "--help"),
                 "pass": partial(_run, sys.executable, "-c", "pass"),
+                "typer": partial(_run, sys.executable, "-c", "import typer"),
                 "score": partial(_run, coooler, "score", str(predictions), "--truth", str(truth)),
                 "imports": partial(_run, sys.executable, "-c", IMPORTS),
             },
@@ -42,6 +43,7 @@ def measure() -> list[Measure]:
         )
     return [
         Measure("coooler --help", times["help"], "python -c pass", times["pass"], "at most 8"),
+        Measure("coooler --help", times["help"], "python -c 'import typer'", times["typer"], ""),
         Measure(
             f"coooler score, {VIDEOS} videos, vectors cached",
             times["score"],
