@@ -1,12 +1,12 @@
 """The demo's video pages: making and writing them against writing the same bytes, and against bare jinja2."""
 
 import tempfile
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Iterable
 from pathlib import Path
 
 from bench.timing import Measure, interleaved
 from pipeline.benchmark import Benchmark
+from pipeline.memory import collected_rarely
 from sitegen.board import evaluate_board
 from sitegen.build import build_site
 from sitegen.gather import gather, read_boxes, read_truth_by_video
@@ -14,8 +14,9 @@ from sitegen.gathered import SiteData
 from sitegen.language import ENGLISH, speaking
 from sitegen.media import media_from_json
 from sitegen.output import open_output
-from sitegen.pages import make_pages
+from sitegen.pages import Page, make_pages
 from sitegen.rendering import environment, render
+from sitegen.rendering_pool import rendered
 
 
 def demo_data(benchmark: Benchmark, folder: Path) -> SiteData:
@@ -28,11 +29,12 @@ def demo_data(benchmark: Benchmark, folder: Path) -> SiteData:
     return gather(benchmark, truth, read_boxes(benchmark, truth), media, board)
 
 
-def write(out: Path, pages: dict[str, Callable[[], bytes]]) -> None:
+@collected_rarely()
+def write(out: Path, pages: Iterable[tuple[Page, bytes]]) -> None:
     """Pages into a new folder, as a build does it: staged, stamped, each synced, moved into place."""
     output = open_output(out)
-    for path, made in pages.items():
-        output.add_page(path, "", made)
+    for page, made in pages:
+        output.put_page(page.path, "", made)
     output.finish(output.stamp(), {}, "", {})
 
 
@@ -42,14 +44,14 @@ def measure(benchmark: Benchmark) -> list[Measure]:
         root, turn = Path(name), iter(range(1_000))
         data = demo_data(benchmark, root / "site")
         pages = [page for page in make_pages(data) if page.template == "video.html"]
-        made = {page.path: render(page, "") for page in pages}
+        made = [(page, render(page, "")) for page in pages]
         contexts = [page.make() for page in pages]
 
         def ours() -> None:
-            write(root / str(next(turn)), {page.path: partial(render, page, "") for page in pages})
+            write(root / str(next(turn)), rendered(pages, "", ENGLISH.tag, 1))
 
         def written() -> None:
-            write(root / str(next(turn)), {path: partial(bytes, data) for path, data in made.items()})
+            write(root / str(next(turn)), made)
 
         def bare() -> None:
             for page, context in zip(pages, contexts, strict=True):
@@ -66,7 +68,7 @@ def measure(benchmark: Benchmark) -> list[Measure]:
             }
         )
     what = f"{len(pages)} video pages of {len(data.systems)} systems"
-    size = f"{sum(map(len, made.values())) / len(made) / 1e3:.0f} kB a page"
+    size = f"{sum(len(page) for _, page in made) / len(made) / 1e3:.0f} kB a page"
     gathered = f"what every page shows, hashed for the next build, takes another {times['gathered']:.3g} s"
     return [
         Measure(

@@ -1,31 +1,27 @@
 """What a rebuild costs: nothing changed, another truth row, a submission more, a video more.
 
-The boards are generated: 10 systems on 200 and on 2,000 videos, whose clips are short and small pieces
-of the demo's. Every build scores all submissions again, with their vectors cached.
+The boards are generated: 10 systems on 200 videos with the demo's clips, and on 2,000 and 20,000 without
+clips, whose cost does not depend on how many there are. Every build scores all submissions again, with
+their vectors cached. `python -m bench.rebuild 2000` measures 2,000 videos with the demo's clips alone.
 """
 
 import os
 import random
 import shutil
 import statistics
+import sys
 import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from fractions import Fraction
-from itertools import islice
 from pathlib import Path
 from unittest.mock import patch
-
-from av.video.reformatter import VideoReformatter
 
 from bench.embedding import sentences
 from bench.timing import Measure
 from pipeline.benchmark import Benchmark, open_benchmark
-from pipeline.data.decode import decoded
-from pipeline.data.encode import write_h264
 from pipeline.minilm import OnnxEmbedder, find_embedder
 from pipeline.records import Prediction, TruthHazard
 from pipeline.tables import BOXES, PREDICTIONS, TRUTH
@@ -36,21 +32,15 @@ from sitegen.submissions import store
 
 DEMO = Path(__file__).parent.parent / "demo"
 SYSTEMS = 10
-SCALES = ((200, 5, 5), (2_000, 5, 1))  # videos, rounds, of which so many with what takes minutes
-SMALL_PX, SMALL_FRAMES = (160, 90), 30
+FEW, MANY, MOST = 200, 2_000, 20_000
+LINEAR = 1.1
+EMBEDDED = 2_000  # captions, by whose time that of more is told
 Times = dict[str, list[float]]
 
 
-def small_clips(folder: Path) -> list[Path]:
-    """A small piece of each of the demo's clips."""
-    made = []
-    for clip in sorted((DEMO / "videos").glob("*.mp4")):
-        reformatter = VideoReformatter()
-        frames = islice(decoded(clip), SMALL_FRAMES)
-        small = (reformatter.reformat(frame, *SMALL_PX) for frame in frames)
-        made.append(folder / clip.name)
-        write_h264(made[-1], small, rate=Fraction(25), size=SMALL_PX)
-    return made
+def demo_clips(folder: Path) -> list[Path]:
+    """Copies of the demo's clips in a new folder, where they can be linked."""
+    return sorted(Path(shutil.copytree(DEMO / "videos", folder)).glob("*.mp4"))
 
 
 def write_benchmark(root: Path, clips: Mapping[str, Path | None], systems: int) -> Benchmark:
@@ -90,40 +80,46 @@ def timed(times: Times, what: str) -> Iterator[None]:
     times[what].append(time.perf_counter() - start)
 
 
-def board_of(root: Path, clips: list[Path], videos: int, rounds: int, full_rounds: int) -> list[Measure]:
-    """Three rows; a new submission stays, and the next rounds build it as well.
+def board_of(root: Path, clips: list[Path], videos: int, rounds: int) -> dict[str, float]:
+    """Seconds of each kind of build, by name: medians of `rounds`, but for what is measured once.
 
-    Full builds and new submissions come in `full_rounds` of the rounds only.
+    The videos have these clips in turn, or none. A full build and that of a new submission are measured
+    once; `embed` is what the new captions take, told by `EMBEDDED` of them.
     """
-    ids = {f"v{number:05}": clips[number % len(clips)] for number in range(videos)}
+    ids = {f"v{number:05}": clips[number % len(clips)] if clips else None for number in range(videos)}
     benchmark = write_benchmark(root, ids, SYSTEMS)
     evaluate_board(benchmark)
     embedder = OnnxEmbedder(find_embedder() or DEMO)
     embedder.embed(sentences(8, seed=1))
     times: Times = defaultdict(list)
+    with timed(times, "score"):
+        evaluate_board(benchmark)
+    with timed(times, "full"):
+        rebuild_board(benchmark, root / "site")
+    rebuild_board(benchmark, root / "site")
     for turn in range(rounds):
-        if turn < full_rounds:
-            shutil.rmtree(root / "site", ignore_errors=True)
-            with timed(times, "full"):
-                rebuild_board(benchmark, root / "site")
         with timed(times, "nothing"):
             rebuild_board(benchmark, root / "site")
         change_truth(benchmark, turn)
         with timed(times, "truth"):
             rebuild_board(benchmark, root / "site")
-        if turn < full_rounds:
-            submit(benchmark, f"New {turn}", sentences(videos, seed=10 + turn))
-            with timed(times, "embed"):
-                embedder.embed(sentences(videos, seed=100 + turn))
-            with timed(times, "submission"):
-                rebuild_board(benchmark, root / "site")
+    few = min(videos, EMBEDDED)
+    with timed(times, "embed"):
+        embedder.embed(sentences(few, seed=100))
+    times["embed"][0] *= videos / few
+    submit(benchmark, "New", sentences(videos, seed=10))
+    with timed(times, "submission"):
+        rebuild_board(benchmark, root / "site")
     shutil.rmtree(root)
-    spent = {what: statistics.median(values) for what, values in times.items()}
-    what = f"rebuild of {videos:,} videos x {SYSTEMS} systems,"
-    once = "measured once" if full_rounds == 1 else f"medians of {full_rounds}"
-    full = f"full build, {once}"
+    return {what: statistics.median(values) for what, values in times.items()}
+
+
+def rows_of(videos: int, has_clips: bool, rounds: int, spent: Mapping[str, float]) -> list[Measure]:
+    """Three rows of what `board_of` measured."""
+    what = f"rebuild of {videos:,} videos x {SYSTEMS} systems, {'the demo’s' if has_clips else 'no'} clips:"
+    full = "full build, measured once"
     floor = spent["embed"] + 0.02 * spent["full"]
-    note = f"medians of {rounds}"
+    note = f"medians of {rounds}" if rounds > 1 else "measured once"
     return [
         Measure(
             f"{what} nothing changed", spent["nothing"], full, spent["full"], "at most 0.02 at 2,000", note
@@ -135,8 +131,29 @@ def board_of(root: Path, clips: list[Path], videos: int, rounds: int, full_round
             "embedding its captions and 2 % of a full build",
             floor,
             "at most 1.3",
-            f"{once}; embedding {spent['embed']:.3g} s, a full build {spent['full']:.3g} s",
+            f"measured once; embedding {spent['embed']:.3g} s, a full build {spent['full']:.3g} s",
         ),
+    ]
+
+
+def growth(many: Mapping[str, float], most: Mapping[str, float]) -> list[Measure]:
+    """What ten times the videos cost, in tenths: a row for each step."""
+    names = {
+        "score": "scores, vectors cached",
+        "full": "full build",
+        "nothing": "nothing changed",
+        "truth": "one truth row changed",
+        "submission": "a submission more",
+    }
+    return [
+        Measure(
+            f"{MOST:,} videos x {SYSTEMS} systems, no clips: {name}",
+            most[what],
+            f"{MOST // MANY} times that of {MANY:,}",
+            MOST // MANY * many[what],
+            f"at most {LINEAR}",
+        )
+        for what, name in names.items()
     ]
 
 
@@ -149,10 +166,9 @@ def change_truth(benchmark: Benchmark, turn: int) -> None:
 
 def one_more_video(root: Path, rounds: int = 5) -> list[Measure]:
     """One row: the demo's clips and two of them again; the last comes, unknown to the systems, and goes."""
-    (root / "clips").mkdir(parents=True)
     clips: dict[str, Path] = {}
     boxes = []
-    demo = sorted((DEMO / "videos").glob("*.mp4"))
+    demo = demo_clips(root / "clips")
     all_boxes = BOXES.read(DEMO / "boxes.parquet")
     for number, clip in enumerate([*demo, *demo[:2]], start=1):
         video_id = f"v{number:02}"
@@ -182,12 +198,29 @@ def one_more_video(root: Path, rounds: int = 5) -> list[Measure]:
 
 
 def measure() -> list[Measure]:
-    """Seven rows, in folders and with a cache of vectors that are thrown away."""
-    with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, {"COOOLER_CACHE": f"{name}/cache"}):
-        root = Path(name)
-        (root / "small").mkdir()
-        clips = small_clips(root / "small")
+    """A row for a video more, three for each size of board, and how the cost grows."""
+    with scratch() as root:
         rows = one_more_video(root / "sixteen")
-        for videos, rounds, full_rounds in SCALES:
-            rows += board_of(root / str(videos), clips, videos, rounds, full_rounds)
-    return rows
+        few = board_of(root / "few", demo_clips(root / "clips"), FEW, 5)
+        many = board_of(root / "many", [], MANY, 5)
+        most = board_of(root / "most", [], MOST, 1)
+    rows += rows_of(FEW, True, 5, few) + rows_of(MANY, False, 5, many) + rows_of(MOST, False, 1, most)
+    return rows + growth(many, most)
+
+
+@contextmanager
+def scratch() -> Iterator[Path]:
+    """A folder and a cache of vectors that are thrown away."""
+    with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, {"COOOLER_CACHE": f"{name}/cache"}):
+        yield Path(name)
+
+
+def main(videos: int) -> None:
+    """Print the rows of a board of so many videos with the demo's clips."""
+    with scratch() as root:
+        for row in rows_of(videos, True, 1, board_of(root / "board", demo_clips(root / "clips"), videos, 1)):
+            print(f"{row.what}: {row.ours_s:.3g} s, {row.ratio:.3g} of {row.peer}; {row.note}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from pipeline.benchmark import Benchmark
 from pipeline.errors import InputError
 from pipeline.files import locked, slug
+from pipeline.memory import collected_rarely
 from pipeline.minilm import open_embedder
 from pipeline.records import TruthHazard
 from pipeline.scores import Submission
@@ -185,6 +186,7 @@ def rebuild_board(
     return built
 
 
+@collected_rarely()
 def _build(
     benchmark: Benchmark, out: Path, bar: "Progress | None", as_of: str, today: str
 ) -> tuple[list[Standing], BuildReport, list[ledger.Entry]]:

@@ -193,9 +193,9 @@ def _all_media(
             media[job.video_id], remembered[job.video_id] = kept
     for done, (job, made) in enumerate(_make_all(missing, jobs), start=1):
         output.add_all(made.files)
-        files = {path: output.files[path] for path, _ in made.files}
-        entry = {"key": job.key, "files": files, "media": media_to_json(made.media)}
-        output.note(job.name, entry)
+        entry = {"key": job.key, "media": media_to_json(made.media)}
+        if made.files:
+            output.note(job.name, entry | {"files": {path: output.files[path] for path, _ in made.files}})
         media[job.video_id], remembered[job.video_id] = made.media, entry
         tell("Cutting keyframes", done, len(missing))
     return dict(sorted(media.items())), remembered, len(missing)
@@ -203,13 +203,15 @@ def _all_media(
 
 def _kept(output: Output, job: MediaJob) -> tuple[VideoMedia, Any] | None:
     """The pictures that an earlier or a killed build made of the same things, when they are still there."""
-    for entry in (output.before.media.get(job.video_id), output.noted(job.name)):
+    before = output.before
+    for entry in (before.media.get(job.video_id), output.noted(job.name)):
         if not isinstance(entry, dict) or entry.get("key") != job.key:
             continue
         try:
             found = media_from_json(entry["media"])
-            if output.kept(entry["files"]):
-                return found, entry
+            files = entry.get("files") or {path: before.files[path][0] for path in found.paths}
+            if output.kept(files):
+                return found, {"key": entry["key"], "media": entry["media"]}
         except (KeyError, TypeError, ValueError, AttributeError):
             continue
     return None

@@ -98,6 +98,13 @@ class VideoMedia:
     note: str = ""
     problem: str = ""
 
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """All its files, from the site's root."""
+        pictures = (path for frame in self.frames for path in (frame.thumb, frame.full))
+        others = (*(crop.path for crop in self.crops), self.card, self.clip)
+        return tuple(path for path in (*pictures, *others) if path)
+
 
 @dataclass(frozen=True, slots=True)
 class Records:

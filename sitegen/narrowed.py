@@ -1,12 +1,13 @@
-"""What the page of one video shows of a site's data, and nothing else: the rest cannot change the page."""
+"""What a page of few videos shows of a site's data, and nothing else: the rest cannot change the page."""
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import takewhile
 
-from pipeline.scores import Evaluation, Scorecard, Signature, Submission
+from pipeline.records import Prediction
+from pipeline.scores import Evaluation, PairScore, Scorecard, Signature, Submission, VideoScore
 from sitegen.failures import Blame, Failure
-from sitegen.gathered import SiteData, System
+from sitegen.gathered import Records, SiteData, System
 from sitegen.language import said_again
 from sitegen.restoration import Restorations
 from sitegen.uncertainty import Interval, Uncertainty
@@ -29,28 +30,54 @@ def of_video(data: SiteData, video_id: str) -> SiteData:
         {video_id: data.boxes.get(video_id, ())},
         {video_id: data.media[video_id]},
         {video_id: data.names[video_id]},
-        tuple(_system(system, video_id) for system in data.systems),
+        tuple(_on_video(system, video_id) for system in data.systems),
         restored=Restorations((restored,) if restored else ()),
         proposed_by=data.proposed_by,
     )
 
 
-def _system(system: System, video_id: str) -> System:
+def of_lines(data: SiteData, system: System, video_ids: Sequence[str]) -> tuple[SiteData, System]:
+    """The data for lines of one system on these videos: their truth, its words and its scores there."""
+    said = [row for video_id in video_ids for row in system.predictions.get(video_id, ())]
+    scores = [score for video_id in video_ids if (score := system.scores.get(video_id))]
+    one = _system(system, said, scores)
+    truth = {video_id: data.truth[video_id] for video_id in video_ids}
+    names = {video_id: data.names[video_id] for video_id in video_ids}
+    return SiteData(data.settings, truth, {}, {}, names, (one,)), one
+
+
+def _on_video(system: System, video_id: str) -> System:
     score = system.scores.get(video_id)
-    said = tuple(system.predictions.get(video_id, ()))
-    pairs = tuple(system.pairs.get(video_id, ()))
     records = system.records.get(video_id)
-    blame = system.blame and Blame(failures_of(system.blame.failures, video_id), ())
+    return _system(
+        system,
+        system.predictions.get(video_id, ()),
+        (score,) if score else (),
+        system.pairs.get(video_id, ()),
+        {video_id: records} if records else {},
+        system.blame and Blame(failures_of(system.blame.failures, video_id), ()),
+    )
+
+
+def _system(
+    system: System,
+    said: Sequence[Prediction],
+    scores: Sequence[VideoScore],
+    pairs: Sequence[PairScore] = (),
+    records: Mapping[str, Records] | None = None,
+    blame: Blame | None = None,
+) -> System:
+    submission = Submission(system.name, "", "", "", "", tuple(said))
     return System(
         0,
         0,
         system.slug,
         said_again(system.agents),  # a worker process gets it as plain text
         system.is_baseline,
-        Evaluation(Submission(system.name, "", "", "", "", said), pairs, (score,) if score else (), _NO_CARD),
+        Evaluation(submission, tuple(pairs), tuple(scores), _NO_CARD),
         _UNSURE,
         "",
-        records={video_id: records} if records else {},
+        records=records or {},
         rehearsed=system.rehearsed,
         blame=blame,
     )

@@ -64,7 +64,7 @@ def submission_page(data: SiteData, system: System, shell: Shell) -> SubmissionP
         warnings=tuple(visible(warning) for warning in submission.warnings),
         signature=str(system.evaluation.card.signature),
         threshold=fixed(data.settings.threshold, 2),
-        pager=_pager(system, first) if first.listing.pages > 1 else None,
+        pager=lines_pager(system, first) if first.listing.pages > 1 else None,
         span=span_of(first),
     )
 
@@ -74,20 +74,23 @@ def submission_parts(data: SiteData) -> tuple[ListPage, ...]:
     return tuple(pages_of(Listing(ALL, (Group("", data.video_ids),))))
 
 
-def submission_lines(data: SiteData, system: System, page: ListPage, shell: Shell) -> SubmissionLines:
-    """The context of submissions/<slug>/<n>.html."""
+def submission_lines(
+    data: SiteData, system: System, pager: Pager, span: str, shell: Shell
+) -> SubmissionLines:
+    """The context of submissions/<slug>/<n>.html, whose videos are those of `data`."""
     return SubmissionLines(
         shell=shell,
         slug=system.slug,
         name=visible(system.name),
         hidden=data.hidden,
-        lines=tuple(_line(data, system, video_id) for video_id in page.video_ids),
-        pager=_pager(system, page),
-        span=span_of(page),
+        lines=tuple(_line(data, system, video_id) for video_id in data.video_ids),
+        pager=pager,
+        span=span,
     )
 
 
-def _pager(system: System, page: ListPage) -> Pager:
+def lines_pager(system: System, page: ListPage) -> Pager:
+    """From one page of a system's videos to the others."""
     return pager(page.number, page.listing.pages, partial(submission_path, system.slug))
 
 

@@ -17,7 +17,7 @@ from sitegen.failures import Blame
 from sitegen.gathered import SiteData, System
 from sitegen.language import ENGLISH, ngettext, speaking, whole
 from sitegen.language import gettext as _
-from sitegen.narrowed import of_video
+from sitegen.narrowed import of_lines, of_video
 from sitegen.page_board import leaderboard_page, video_href, videos_page
 from sitegen.page_compare import ComparePage, compare_page
 from sitegen.page_data import DataPage, data_page
@@ -25,10 +25,16 @@ from sitegen.page_failures import FailuresPage, failures_page
 from sitegen.page_method import method_page
 from sitegen.page_restoration import PATH as RESTORATION
 from sitegen.page_restoration import RestorationPage, restoration_files, restoration_page
-from sitegen.page_submission import submission_lines, submission_page, submission_parts, submission_path
+from sitegen.page_submission import (
+    lines_pager,
+    submission_lines,
+    submission_page,
+    submission_parts,
+    submission_path,
+)
 from sitegen.page_submit import SubmitPage, submit_files, submit_page
 from sitegen.page_video import Place, video_page
-from sitegen.page_videos import VideoListPage, is_long, list_files, list_pages
+from sitegen.page_videos import VideoListPage, is_long, list_files, list_pages, span_of
 from sitegen.page_vote import VotePage, vote_files, vote_page
 from sitegen.spreads import spreads
 from sitegen.submission_contexts import SubmissionLines, SubmissionPage
@@ -103,8 +109,9 @@ def make_pages(data: SiteData) -> Iterator[Page]:
                 title=visible(system.name), n=whole(rest.number), pages=whole(rest.listing.pages)
             )
             shell = _shell(data, title, about, "../../", "leaderboard")
-            made_lines = partial(submission_lines, data, system, rest, shell)
-            yield Page(submission_path(system.slug, rest.number), "submission_lines.html", made_lines)
+            shown = *of_lines(data, system, rest.video_ids), lines_pager(system, rest), span_of(rest), shell
+            path, template = submission_path(system.slug, rest.number), "submission_lines.html"
+            yield Page(path, template, partial(submission_lines, *shown), _sha256(shown))
     if not data.hidden:
         about = _("Every hazard that a system missed, where it was lost, and every wrong caption.")
         shell = _shell(data, _("Failures"), about, "", "failures")
@@ -149,9 +156,12 @@ def _video_pages(data: SiteData) -> Iterator[Page]:
             _("{n} of {total}").format(n=place + 1, total=len(ids)),
         )
         view = of_video(data, video_id)
-        shows = sha256_of(repr((view, shell, where)).encode(errors="replace"))
         made = partial(_video_page, view, video_id, shell, where)
-        yield Page(links[place].href, "video.html", made, shows)
+        yield Page(links[place].href, "video.html", made, _sha256((view, shell, where)))
+
+
+def _sha256(shown: object) -> str:
+    return sha256_of(repr(shown).encode(errors="replace"))
 
 
 def _video_page(view: SiteData, video_id: str, shell: Shell, place: Place) -> VideoPage:

@@ -8,6 +8,7 @@ from functools import partial
 from itertools import chain, islice
 from typing import TypeAlias
 
+from pipeline.memory import collect_rarely
 from sitegen.catalogues import read_language
 from sitegen.language import speak
 from sitegen.pages import Page
@@ -84,6 +85,7 @@ def _noted(page: Page, address: str, how: Render) -> bytes:
 
 def _start(language: str) -> None:
     """In a worker: its pages are in this language."""
+    collect_rarely()
     speak(read_language(language, find_locale()))
 
 

@@ -116,7 +116,8 @@ def _saying(run: Sequence[StageOutput]) -> Saying:
     said = first.items
     if len(said) == 1:
         spoken = first.reply.text.strip()
-        if not {said[0].label, said[0].description}.isdisjoint((spoken, spoken.rstrip("."))):
+        forms = (spoken, spoken.rstrip("."))
+        if said[0].label in forms or said[0].description in forms:
             said = ()
     items = tuple(
         (visible(item.label), "" if item.description == item.label else visible(item.description))

@@ -22,13 +22,15 @@ def film(
     for box in boxes:
         by_frame.setdefault(box.frame_index, []).append(box)
     frames = []
+    drawn = _Overlays(media)
+    moment = _("Frame {n} at {time}")
     for place, picture in enumerate(media.frames):
         # Hazards last, so that they are drawn on top.
         ordered = sorted(
             by_frame.get(picture.index, ()), key=lambda box: (box.kind is Kind.CHALLENGE, box.track_id)
         )
         time = seconds(picture.time_s)
-        when = _("Frame {n} at {time}").format(n=picture.index, time=time)
+        when = moment.format(n=picture.index, time=time)
         frames.append(
             FilmFrame(
                 place + 1,
@@ -37,7 +39,7 @@ def film(
                 picture.thumb,
                 picture.full,
                 when if hidden else f"{when}: {_boxes_text(ordered, labels) or _('no boxes')}",
-                tuple(_overlay(box, media) for box in ordered),
+                tuple(map(drawn.of, ordered)),
                 place == media.cover,
             )
         )
@@ -116,24 +118,33 @@ def tracks_text(tracks: Sequence[TrackChip], proposed_by: str = "") -> str:
     return _("{tracks}, {n} proposed").format(tracks=text, n=proposed) if proposed else text
 
 
-def _overlay(box: TrackBox, media: VideoMedia) -> OverlayBox:
-    right, bottom, corners = float(media.width_px), float(media.height_px), box.box
-    x1, x2 = min(max(corners.x1_px, 0.0), right), min(max(corners.x2_px, 0.0), right)
-    y1, y2 = min(max(corners.y1_px, 0.0), bottom), min(max(corners.y2_px, 0.0), bottom)
-    size = label_px(media)
-    text_y = y1 - size * 0.35 if y1 > size * 1.4 else y1 + size
-    track = visible(box.track_id)
-    return OverlayBox(
-        number(x1),
-        number(y1),
-        number(max(0.0, x2 - x1)),
-        number(max(0.0, y2 - y1)),
-        number(text_y),
-        track,
-        shorten(track, 16),
-        box.kind is Kind.CHALLENGE,
-        box.kind is Kind.PROPOSED,
-    )
+class _Overlays:
+    """Boxes as they are drawn on the pictures of one video."""
+
+    def __init__(self, media: VideoMedia) -> None:
+        self._right, self._bottom = float(media.width_px), float(media.height_px)
+        self._size = label_px(media)
+        self._named: dict[str, tuple[str, str]] = {}
+
+    def of(self, box: TrackBox) -> OverlayBox:
+        """The part of a box that lies on the picture."""
+        right, bottom, size, corners = self._right, self._bottom, self._size, box.box
+        x1, x2 = min(max(corners.x1_px, 0.0), right), min(max(corners.x2_px, 0.0), right)
+        y1, y2 = min(max(corners.y1_px, 0.0), bottom), min(max(corners.y2_px, 0.0), bottom)
+        named = self._named.get(box.track_id)
+        if named is None:
+            track = visible(box.track_id)
+            named = self._named[box.track_id] = track, shorten(track, 16)
+        return OverlayBox(
+            number(x1),
+            number(y1),
+            number(max(0.0, x2 - x1)),
+            number(max(0.0, y2 - y1)),
+            number(y1 - size * 0.35 if y1 > size * 1.4 else y1 + size),
+            *named,
+            box.kind is Kind.CHALLENGE,
+            box.kind is Kind.PROPOSED,
+        )
 
 
 def label_px(media: VideoMedia) -> float:

@@ -12,6 +12,7 @@ FLOORS = [
         "pipeline.data.tiles",
         "pipeline.errors",
         "pipeline.files",
+        "pipeline.memory",
         "pipeline.records",
     ],
     [
