@@ -1,21 +1,26 @@
-"""Uncertainty of a large board against plain loops over NumPy: one system and one resample at a time."""
+"""Uncertainty and paired tests of boards against plain loops over NumPy: one resample at a time."""
+
+from itertools import combinations
 
 import numpy as np
 
 from bench.timing import Measure, interleaved
 from pipeline.scores import Evaluation, Signature, Submission, VideoScore
+from sitegen.paired import RESAMPLES as DRAWS
+from sitegen.paired import all_pairs
 from sitegen.score import Real, scorecard
 from sitegen.uncertainty import uncertainties, video_columns
 
 SYSTEMS, VIDEOS, RESAMPLES = 300, 1_000, 1_000
+PAIRED = 10  # systems
 
 
-def board() -> list[Evaluation]:
-    """300 systems over 1,000 videos, ever better; the same every time."""
+def board(systems: int) -> list[Evaluation]:
+    """Systems over 1,000 videos, ever better; the same every time."""
     chance = np.random.default_rng(0)
     signature = Signature("1", "bench", "0" * 64, "0" * 64, VIDEOS, 0.8)
     rows = []
-    for system in range(SYSTEMS):
+    for system in range(systems):
         scores = np.clip(chance.normal(0.3 + 0.001 * system, 0.2, VIDEOS), 0, 1).tolist()
         videos = tuple(
             VideoScore(f"v{n:04}", 1, 1, int(s > 0.8), s, s, s, s, s, s > 0.8) for n, s in enumerate(scores)
@@ -38,19 +43,47 @@ def loops(evaluations: list[Evaluation]) -> list[Real]:
     return found
 
 
+def paired_loops(evaluations: list[Evaluation]) -> list[Real]:
+    """Of each two systems and each metric the differences in every resample, and under random signs."""
+    columns = video_columns(evaluations)
+    chance = np.random.default_rng(0)
+    drawn = [chance.integers(VIDEOS, size=VIDEOS) for _ in range(DRAWS)]
+    signs = [chance.integers(2, size=VIDEOS) * 2.0 - 1 for _ in range(DRAWS)]
+    found = []
+    for values in columns.values.values():
+        for a, b in combinations(np.ascontiguousarray(values.T), 2):
+            differences = a - b
+            found.append(np.quantile([differences[rows].mean() for rows in drawn], (0.025, 0.975)))
+            found.append(np.array([(differences * sign).mean() for sign in signs]))
+    return found
+
+
 def measure() -> list[Measure]:
-    """One row: intervals, bands and ranks of all systems, from evaluations."""
-    rows = board()
-    times = interleaved({"ours": lambda: uncertainties(rows), "loops": lambda: loops(rows)}, rounds=1)
+    """Two rows: a large board from evaluations, and every two systems of a small one against each other.
+
+    The loops are measured once.
+    """
+    rows, few = board(SYSTEMS), board(PAIRED)
+    ours = interleaved({"board": lambda: uncertainties(rows), "pairs": lambda: all_pairs(few)})
+    theirs = interleaved({"board": lambda: loops(rows), "pairs": lambda: paired_loops(few[:2])}, rounds=1)
+    pairs = PAIRED * (PAIRED - 1) // 2
     return [
         Measure(
             f"{RESAMPLES:,} resamples of {SYSTEMS} systems over {VIDEOS:,} videos",
-            times["ours"],
+            ours["board"],
             "plain loops over NumPy",
-            times["loops"],
+            theirs["board"],
             "under a second",
-            "four intervals, bands and ranks; the loops make the intervals only",
-        )
+            "four intervals, bands and ranks; the loops make the intervals only, once",
+        ),
+        Measure(
+            f"paired tests of {PAIRED} systems over {VIDEOS:,} videos, {DRAWS:,} resamples",
+            ours["pairs"],
+            f"plain loops over NumPy, {pairs} times those of one pair",
+            theirs["pairs"] * pairs,
+            "",
+            "four metrics, bootstrap and randomisation; the loops once",
+        ),
     ]
 
 
