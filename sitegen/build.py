@@ -221,7 +221,7 @@ def _make_all(todo: Sequence[MediaJob], jobs: int) -> Iterator[tuple[MediaJob, M
     """Each job with its pictures, as soon as they are made."""
     if jobs < 2 or len(todo) <= _FEW:
         for job in todo:
-            yield job, make_media(job)
+            yield job, make_media(job, jobs)
         return
     with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=multiprocessing.get_context("spawn")) as pool:
         futures = {pool.submit(make_media, job): job for job in todo}

@@ -9,7 +9,9 @@ Boxes are not burnt in: pages draw them over the pictures, so that a reader can 
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,7 @@ from numpy.typing import NDArray
 from pipeline.errors import VideoError
 from pipeline.files import sha256_of
 from pipeline.records import Box, Frame, Kind, RgbImage, TrackBox
-from pipeline.video import read_keyframes
+from pipeline.video import Keyframes, read_keyframes
 from sitegen.gathered import CropPicture, KeyframePicture, VideoMedia
 from sitegen.language import N_
 
@@ -98,8 +100,11 @@ def media_from_json(data: dict[str, Any]) -> VideoMedia:
     return VideoMedia(**{**data, "frames": frames, "crops": crops})
 
 
-def make_media(job: MediaJob) -> MadeMedia:
-    """Decode the clip once and encode its pictures. A clip that cannot be used is said, not raised."""
+def make_media(job: MediaJob, threads: int = 1) -> MadeMedia:
+    """Decode the clip once and encode its pictures, in so many threads; their bytes are the same for any.
+
+    A clip that cannot be used is said, not raised.
+    """
     if job.clip is None:
         missing = N_("There is no clip of this video.")
         return MadeMedia(VideoMedia(job.video_id, job.name, problem=missing), ())
@@ -108,21 +113,26 @@ def make_media(job: MediaJob) -> MadeMedia:
     except VideoError as error:
         problem = str(error).replace(str(job.clip), job.clip.name)
         return MadeMedia(VideoMedia(job.video_id, job.name, problem=problem), ())
+    with ThreadPoolExecutor(threads) as pool:
+        return _made(job, found, pool)
+
+
+def _made(job: MediaJob, found: Keyframes, pool: ThreadPoolExecutor) -> MadeMedia:
     settings, folder = job.settings, f"media/{job.name}"
-    files: list[tuple[str, bytes]] = []
+    files: list[tuple[str, Future[bytes]]] = []
     frames: list[KeyframePicture] = []
     cover = _cover(found.frames, job.boxes)
-    larges = [_fit(frame.rgb, settings.full_px) for frame in found.frames]
-    thumbs = _thumbs([_fit(large, settings.thumb_px) for large in larges], settings)
-    for place, (frame, large, encoded) in enumerate(zip(found.frames, larges, thumbs, strict=True)):
+    larges = list(pool.map(lambda frame: _fit(frame.rgb, settings.full_px), found.frames))
+    smalls = list(pool.map(lambda large: _fit(large, settings.thumb_px), larges))
+    for place, (frame, large) in enumerate(zip(found.frames, larges, strict=True)):
         thumb, full = f"{folder}/t{frame.index:06d}.webp", f"{folder}/f{frame.index:06d}.jpg"
-        files.append((thumb, encoded))
         if place == cover:
             full = f"{folder}/cover.webp"
-            files.append((full, _webp(large, settings.cover_quality)))
-            files.append((f"{folder}/card.webp", _webp(_fit(large, settings.card_px), settings.card_quality)))
+            card = _fit(large, settings.card_px)
+            files.append((full, pool.submit(_webp, large, settings.cover_quality)))
+            files.append((f"{folder}/card.webp", pool.submit(_webp, card, settings.card_quality)))
         else:
-            files.append((full, _jpeg(large, settings.full_quality)))
+            files.append((full, pool.submit(_jpeg, large, settings.full_quality)))
         frames.append(KeyframePicture(frame.index, round(frame.time_s, 3), thumb, full))
     crops: list[CropPicture] = []
     pictures = {frame.index: frame.rgb for frame in found.frames}
@@ -130,7 +140,7 @@ def make_media(job: MediaJob) -> MadeMedia:
         picture = _cut(pictures[chosen.frame_index], chosen.box)
         small = _fit(picture, settings.crop_px, max(picture.shape[:2]))
         path = f"{folder}/c{number:03d}.webp"
-        files.append((path, _webp(small, settings.crop_quality)))
+        files.append((path, pool.submit(_webp, small, settings.crop_quality)))
         crops.append(
             CropPicture(
                 chosen.track_id,
@@ -143,10 +153,12 @@ def make_media(job: MediaJob) -> MadeMedia:
                 small.shape[0],
             )
         )
+    thumbs = zip((frame.thumb for frame in frames), _thumbs(smalls, settings, pool), strict=True)
+    made = [*thumbs, *((path, encoded.result()) for path, encoded in files)]
     clip = ""
-    if job.show_clip and job.clip.suffix.lower() in {".mp4", ".m4v", ".webm"}:
+    if job.clip and job.show_clip and job.clip.suffix.lower() in {".mp4", ".m4v", ".webm"}:
         clip = f"{folder}/clip{job.clip.suffix.lower()}"
-        files.append((clip, job.clip.read_bytes()))
+        made.append((clip, job.clip.read_bytes()))
     video = found.video
     media = VideoMedia(
         job.video_id,
@@ -162,13 +174,13 @@ def make_media(job: MediaJob) -> MadeMedia:
         clip,
         found.note,
     )
-    return MadeMedia(media, tuple(files))
+    return MadeMedia(media, tuple(made))
 
 
-def _thumbs(pictures: Sequence[RgbImage], settings: MediaSettings) -> list[bytes]:
+def _thumbs(pictures: Sequence[RgbImage], settings: MediaSettings, pool: ThreadPoolExecutor) -> list[bytes]:
     """The small keyframes as WebP, together as light as a page can afford."""
     for quality in settings.thumb_qualities:
-        encoded = [_webp(picture, quality) for picture in pictures]
+        encoded = list(pool.map(_webp, pictures, repeat(quality)))
         if sum(map(len, encoded)) <= settings.thumbs_bytes:
             break
     return encoded

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.records import Box, Kind, TrackBox
 from sitegen.media import MediaJob, MediaSettings, make_media
 from tests.clips import write_clip
 
@@ -21,3 +22,10 @@ def test_small_keyframes_of_a_busy_clip_get_a_lower_quality(tmp_path: Path) -> N
     assert good > less > least
     for limit, expected in ((good, good), (good - 1, less), (less, less), (less - 1, least), (0, least)):
         assert _thumbs(clip, MediaSettings(thumbs_bytes=limit)) == expected
+
+
+def test_threads_make_the_same_bytes(tmp_path: Path) -> None:
+    write_clip(tmp_path / "v.mp4", 40, (320, 180))
+    boxes = tuple(TrackBox("v", at, "t", Kind.CHALLENGE, Box(10, 10, 90, 80)) for at in range(40))
+    job = MediaJob("v", "v", tmp_path / "v.mp4", "", boxes, True)
+    assert make_media(job, threads=3) == make_media(job)
