@@ -36,7 +36,7 @@ CATALOGUE = "assets/catalogue.js"
 PLOTLY = "assets/plotly.min.js"
 _FEW = 2  # starting processes costs more than this many clips
 # Folders of a site that only a build fills.
-_OURS = ("data", "list", "media", "restored", "submissions", "videos")
+_OURS = ("data", "list", "media", "restoration", "restored", "submissions", "videos")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The page of restored clips: what was done to each, by which method, and a frame before and after."""
+"""The pages of restored clips: what was done to each, by which method, and a frame before and after."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,10 +9,15 @@ from sitegen.language import N_
 from sitegen.language import gettext as _
 from sitegen.numerals import plural
 from sitegen.page_board import video_href
+from sitegen.pager import Pager, pager
 from sitegen.restoration import Picture, Restoration
 from sitegen.words import shorten, visible
 
-PATH = "restoration.html"
+CLIPS = 100
+"""So many clips stand on a page."""
+
+SHOWN_PROBLEMS = 100
+
 STEPS = {"watermark": N_("Watermark"), "denoise": N_("Noise"), "deblur": N_("Blur")}
 
 
@@ -57,9 +62,10 @@ class ClipView:
 
 @dataclass(frozen=True, slots=True)
 class RestorationPage:
-    """restoration.html
+    """restoration.html, restoration/2.html and so on; `pager` is None where there is one page.
 
-    `problems` are the records that could not be used; `marked` says whether any clip has a mask or boxes.
+    `problems` are the records that could not be used, told of on the first page; `marked` says whether any
+    clip here has a mask or boxes.
     """
 
     shell: Shell
@@ -67,28 +73,45 @@ class RestorationPage:
     clips: tuple[ClipView, ...]
     problems: tuple[str, ...]
     marked: bool
+    pager: Pager | None
 
 
-def restoration_page(data: SiteData, shell: Shell) -> RestorationPage:
-    """The context of restoration.html."""
-    clips = tuple(_clip(data, one) for one in data.restored.clips)
+def page_count(data: SiteData) -> int:
+    """How many pages there are; none where nothing was restored."""
+    return 0 if data.restored.is_empty else max(1, -(-len(data.restored.clips) // CLIPS))
+
+
+def path_of(number: int) -> str:
+    """The path of a page, from 1."""
+    return "restoration.html" if number == 1 else f"restoration/{number}.html"
+
+
+def restoration_page(data: SiteData, number: int, shell: Shell) -> RestorationPage:
+    """The context of a page, from 1."""
+    clips = tuple(_clip(data, one) for one in data.restored.clips[(number - 1) * CLIPS : number * CLIPS])
     marked = any(clip.boxes or clip.overlay for clip in clips)
-    summary = plural(len(clips), "{n} clip", "{n} clips")
-    return RestorationPage(shell, summary, clips, data.restored.problems, marked)
+    summary = plural(len(data.restored.clips), "{n} clip", "{n} clips")
+    problems = data.restored.problems if number == 1 else ()
+    if len(problems) > SHOWN_PROBLEMS:
+        more = plural(len(problems) - SHOWN_PROBLEMS, "and {n} more", "and {n} more")
+        problems = (*problems[:SHOWN_PROBLEMS], more)
+    pages = page_count(data)
+    links = pager(number, pages, path_of) if pages > 1 else None
+    return RestorationPage(shell, summary, clips, problems, marked, links)
 
 
 def restoration_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
-    """The page's pictures: (path, content)."""
+    """The pages' pictures: (path, content). Raises InputError when one was changed meanwhile."""
     for clip in data.restored.clips:
         for picture in (clip.before, clip.after, clip.overlay):
             if picture:
-                yield picture.path, picture.data
+                yield picture.path, picture.read()
 
 
 def restored_href(data: SiteData, video_id: str) -> str:
     """Where a video's pictures before and after are, from the site's root; empty when it has none."""
     clip = data.restored.by_video.get(video_id)
-    return f"{PATH}#clip-{clip.name}" if clip else ""
+    return f"{path_of(clip.place // CLIPS + 1)}#clip-{clip.name}" if clip else ""
 
 
 def _clip(data: SiteData, one: Restoration) -> ClipView:

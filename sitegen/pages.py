@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from pipeline import __version__
 from pipeline.files import sha256_of
-from sitegen import charts
+from sitegen import charts, page_restoration
 from sitegen.board_files import board_files
 from sitegen.compare_files import compare_files
 from sitegen.contexts import LeaderboardPage, Link, MethodPage, Shell, VideosPage
@@ -23,8 +23,7 @@ from sitegen.page_compare import ComparePage, compare_page
 from sitegen.page_data import DataPage, data_page
 from sitegen.page_failures import FailuresPage, failures_page
 from sitegen.page_method import method_page
-from sitegen.page_restoration import PATH as RESTORATION
-from sitegen.page_restoration import RestorationPage, restoration_files, restoration_page
+from sitegen.page_restoration import RestorationPage, restoration_files
 from sitegen.page_submission import (
     lines_pager,
     submission_lines,
@@ -128,13 +127,22 @@ def make_pages(data: SiteData) -> Iterator[Page]:
     about = _("What the data hold: descriptions, labels, boxes, clips, and what a check of them found.")
     shell = _shell(data, _("About the data"), about, "", "data")
     yield Page("data.html", "data.html", partial(data_page, data, shell))
-    if not data.restored.is_empty:
-        about = _("What was done to the clips, by which method, and a frame of each before and after.")
-        shell = _shell(data, _("Restored clips"), about, "", "videos")
-        yield Page(RESTORATION, "restoration.html", partial(restoration_page, data, shell))
+    yield from _restoration_pages(data)
     about = _("What BESM, SAM, detection and hazard recall are, with an example; prompts, models, sources.")
     shell = _shell(data, _("Method"), about, "", "method")
     yield Page("method.html", "method.html", partial(method_page, data, shell))
+
+
+def _restoration_pages(data: SiteData) -> Iterator[Page]:
+    about = _("What was done to the clips, by which method, and a frame of each before and after.")
+    pages = page_restoration.page_count(data)
+    for number in range(1, pages + 1):
+        title = _("Restored clips")
+        if number > 1:
+            title = _("{title}, page {n} of {pages}").format(title=title, n=whole(number), pages=whole(pages))
+        shell = _shell(data, title, about, "../" if number > 1 else "", "videos")
+        made = partial(page_restoration.restoration_page, data, number, shell)
+        yield Page(page_restoration.path_of(number), "restoration.html", made)
 
 
 def _video_pages(data: SiteData) -> Iterator[Page]:

@@ -20,7 +20,7 @@ from sitegen.checks import MAX_ID_CHARS, visible
 FOLDER = "restoration"
 ENDING = ".restore.json"
 PICTURES = ("before.webp", "after.webp", "overlay.webp")
-MAX_RECORDS = 10_000
+MAX_RECORDS = 100_000
 MAX_RECORD_BYTES = 2**20
 MAX_PICTURE_BYTES = 512 * 1024
 MAX_PICTURE_PX = 2_048
@@ -68,18 +68,30 @@ class Record(_Outside):
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture: its path from the site's root, its size, its bytes."""
+    """A picture: its path from the site's root, its size, its hash, and where it lies."""
 
     path: str
     width_px: int
     height_px: int
-    data: bytes = field(repr=False)
+    sha256: str
+    source: Path = field(repr=False)
+
+    def read(self) -> bytes:
+        """Its bytes. Raises InputError when it changed since the record was read."""
+        data = _bytes(self.source, MAX_PICTURE_BYTES)
+        if sha256_of(data) != self.sha256:
+            raise InputError(f"{self.source.name}: it was changed while it was used. Build again.")
+        return data
 
 
 @dataclass(frozen=True, slots=True)
 class Restoration:
-    """A restored clip; `name` is a safe path part, `overlay` None where nothing was masked."""
+    """A restored clip; `name` is a safe path part, `overlay` None where nothing was masked.
 
+    `place` counts the clips from 0, as pages show them.
+    """
+
+    place: int
     name: str
     record: Record
     before: Picture
@@ -115,13 +127,13 @@ def read_restorations(videos: Path) -> Restorations:
         problems.append(f"{FOLDER}: found {len(paths):,} records; only the first {MAX_RECORDS:,} are read")
     for path in paths[:MAX_RECORDS]:
         try:
-            clips.append(_restoration(path))
+            clips.append(_restoration(path, len(clips)))
         except InputError as error:
             problems.append(visible(str(error), 400))
     return Restorations(tuple(clips), tuple(problems))
 
 
-def _restoration(path: Path) -> Restoration:
+def _restoration(path: Path, place: int) -> Restoration:
     """One record with its pictures. Raises InputError when it cannot be used."""
     stem = path.name.removesuffix(ENDING)
     name = f"{slug(stem)[:40] or 'clip'}-{sha256_of(stem.encode(errors='replace'))[:10]}"
@@ -134,7 +146,7 @@ def _restoration(path: Path) -> Restoration:
     sizes = {(one.width_px, one.height_px) for one in (before, after, overlay) if one}
     if len(sizes) > 1:
         raise InputError(f"{path.name}: its pictures are of different sizes. Restore the clip again.")
-    return Restoration(name, record, before, after, overlay)
+    return Restoration(place, name, record, before, after, overlay)
 
 
 def _record(path: Path) -> Record:
@@ -174,7 +186,7 @@ def _picture(folder: Path, stem: str, ending: str, name: str, record: Record) ->
     size = webp_size(data)
     if size is None or max(size) > MAX_PICTURE_PX:
         raise InputError(f"{path.name}: found no WebP picture of at most {MAX_PICTURE_PX} px a side.")
-    return Picture(f"restored/{name}/{ending}", *size, data)
+    return Picture(f"restored/{name}/{ending}", *size, stated, path)
 
 
 def webp_size(data: bytes) -> tuple[int, int] | None:

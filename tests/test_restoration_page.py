@@ -1,6 +1,7 @@
 """The page of restored clips: what records say, what broken ones do, and the slider in a real Chromium."""
 
 import json
+import re
 import struct
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,11 @@ from hypothesis import strategies as st
 from playwright.sync_api import Browser, BrowserContext
 
 from pipeline.benchmark import Benchmark
+from pipeline.errors import InputError
+from sitegen import page_restoration
 from sitegen.build import build_site
 from sitegen.output import MANIFEST
+from sitegen.page_restoration import SHOWN_PROBLEMS
 from sitegen.restoration import FOLDER, MAX_PICTURE_BYTES, read_restorations, webp_size
 from sitegen.strict import strict_faults
 from tests.restoration_case import PLAIN, TELEA, make_restored, pictures, put, record
@@ -48,7 +52,7 @@ def test_a_record_and_its_pictures_are_read_as_they_are(tmp_path: Path) -> None:
     assert one.record.steps[0].settings.boxes_px == [(20, 20, 110, 40)]
     assert one.overlay is not None
     for picture, ending in ((one.before, "before"), (one.after, "after"), (one.overlay, "overlay")):
-        assert picture.data == files[f"{ending}.webp"]
+        assert picture.read() == files[f"{ending}.webp"]
         assert (picture.width_px, picture.height_px) == (320, 180)
 
 
@@ -140,6 +144,45 @@ def test_without_records_there_is_no_page(tmp_path: Path) -> None:
     put(plain.videos / FOLDER, "v1", record("v1", files), files)
     build_site(plain, tmp_path / "site", make_board(plain))
     assert (tmp_path / "site" / "restoration.html").is_file() and strict_faults(tmp_path / "site") == []
+
+
+def test_many_clips_have_pages_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page_restoration, "CLIPS", 2)
+    benchmark = make_benchmark(tmp_path / "b")
+    files = pictures(1)
+    for stem in ("v1", "v2", "v3", "w1", "w2"):
+        put(benchmark.videos / FOLDER, stem, record(stem, files), files)
+    put(benchmark.videos / FOLDER, "x", {}, {})
+    site = tmp_path / "site"
+    build_site(benchmark, site, make_board(benchmark))
+    pages = [site / "restoration.html", site / "restoration" / "2.html", site / "restoration" / "3.html"]
+    texts = [page.read_text(encoding="utf-8") for page in pages]
+    shown = [re.findall(r'<h2 id="clip-\w+-\w+-title">(?:<a[^>]*>)?(\w+)', text) for text in texts]
+    assert shown == [["v1", "v2"], ["v3", "w1"], ["w2"]]
+    assert ["x.restore.json" in text for text in texts] == [True, False, False]
+    assert all("5 clips" in text for text in texts) and 'href="../restoration/2.html"' in texts[2]
+    assert "../restoration/2.html#clip-v3" in (site / "videos" / "v3.html").read_text(encoding="utf-8")
+    assert "../restoration.html#clip-v2" in (site / "videos" / "v2.html").read_text(encoding="utf-8")
+    assert strict_faults(site) == []
+
+
+def test_many_broken_records_are_counted(tmp_path: Path) -> None:
+    benchmark = make_benchmark(tmp_path / "b")
+    for number in range(SHOWN_PROBLEMS + 7):
+        put(benchmark.videos / FOLDER, f"x{number:03}", {}, {})
+    build_site(benchmark, tmp_path / "site", make_board(benchmark))
+    page = (tmp_path / "site" / "restoration.html").read_text(encoding="utf-8")
+    assert page.count(".restore.json: ") == SHOWN_PROBLEMS and "and 7 more" in page
+
+
+def test_a_picture_that_changes_meanwhile_is_told_of(tmp_path: Path) -> None:
+    files = pictures(1)
+    put(tmp_path / FOLDER, "a", record("a", files), files)
+    (one,) = read_restorations(tmp_path).clips
+    (tmp_path / FOLDER / "a.after.webp").write_bytes(files["before.webp"])
+    assert one.before.read() == files["before.webp"]
+    with pytest.raises(InputError, match=r"a\.after\.webp: it was changed"):
+        one.after.read()
 
 
 @pytest.mark.browser
