@@ -10,11 +10,22 @@ from typing import Any
 from pipeline.errors import OutsideError
 from pipeline.files import sha256_file, sha256_of, write_bytes
 
+_CHUNK_BYTES = 2**20
+
 
 def is_url(place: str) -> bool:
     """Whether `place` is a URL and not a path."""
     scheme, mark, _ = place.partition("://")
     return bool(mark) and scheme.isalnum() and len(scheme) > 1
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What lies at a place: `kind` is `file`, `directory` or `other`; `size` in bytes, None if unknown."""
+
+    name: str
+    kind: str
+    size: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +74,38 @@ class Place:
             found = system.ls(path, detail=True)
         names = sorted(entry["name"].rsplit("/", 1)[-1] for entry in found if entry["type"] == "file")
         return [self / name for name in names]
+
+    def local(self) -> Path | None:
+        """The path of what lies on this computer, also behind a `file://` URL; None elsewhere."""
+        if not is_url(self.where):
+            return Path(self.where)
+        from fsspec.implementations.local import LocalFileSystem
+
+        system, path = _open(self.where)
+        return Path(path) if isinstance(system, LocalFileSystem) else None
+
+    def entry(self) -> Entry:
+        """What a URL leads to. Raises FileNotFoundError when there is nothing."""
+        system, path = _open(self.where)
+        with _outside(self.where):
+            return _entry(system.info(path))
+
+    def entries(self) -> list[Entry]:
+        """What is in the folder that a URL leads to, each name once, sorted."""
+        system, path = _open(self.where)
+        with _outside(self.where):
+            found = system.ls(path, detail=True)
+            # Some stores list the folder itself too.
+            within = [one for one in found if one["name"].strip("/") != path.strip("/")]
+            by_name = {entry.name: entry for entry in map(_entry, within)}
+        return [by_name[name] for name in sorted(by_name)]
+
+    def chunks(self) -> Iterator[bytes]:
+        """The content of the file that a URL leads to, a piece at a time, however long it is."""
+        system, path = _open(self.where)
+        with _outside(self.where), system.open(path, "rb") as source:
+            while chunk := source.read(_CHUNK_BYTES):
+                yield chunk
 
     def read(self) -> bytes:
         """The file's content. Raises FileNotFoundError when there is none."""
@@ -114,6 +157,10 @@ class Place:
             yield local
 
 
+def _entry(told: dict[str, Any]) -> Entry:
+    return Entry(str(told["name"]).rstrip("/").rsplit("/", 1)[-1], str(told["type"]), told.get("size"))
+
+
 def _open(url: str) -> tuple[Any, str]:
     import fsspec
 
@@ -129,5 +176,10 @@ def _outside(where: str) -> Iterator[None]:
         yield
     except FileNotFoundError:
         raise
+    except ImportError as error:
+        scheme = where.partition("://")[0]
+        raise OutsideError(
+            f"{where}: what reads {scheme}:// is not installed ({error}). Install it beside this package."
+        ) from error
     except Exception as error:  # each store raises its own
         raise OutsideError(f"{where}: {type(error).__name__}: {error}") from error

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace as replaced
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from pipeline.benchmark import Benchmark
@@ -18,8 +19,9 @@ from sitegen import ledger
 from sitegen.about import Sender
 from sitegen.build import BuildReport, build_site
 from sitegen.evaluate import embed_all, evaluate, texts_of, truth_sha256
+from sitegen.packing import as_one_file
 from sitegen.probes import probe_board
-from sitegen.readers import ReadOptions, ReadPredictions, read_predictions, read_truth
+from sitegen.readers import ReadOptions, ReadPredictions, read_given, read_truth
 from sitegen.run_folder import extras_of, predictions_of, with_agents
 from sitegen.scoreboard import board_lines
 from sitegen.standings import Standing
@@ -44,23 +46,26 @@ def submit_file(
     why: str = "",
     today: str = "",
 ) -> Standing:
-    """Check, score and store a predictions file, or those of a run folder with all its records.
+    """Check, score and store a predictions file, shards, or those of a run folder with all its records.
 
     Raises FaultsError with every fault of the file, before anything is written.
     """
     path = predictions_of(file)
-    read = read_predictions(path, known_videos(benchmark), options)
-    return submit_read(
-        benchmark,
-        read,
-        path,
-        with_agents(sender, file),
-        extras=extras_of(file),
-        recording=recording,
-        replace=replace,
-        why=why,
-        today=today,
-    )
+    read = read_given(path, known_videos(benchmark), options)
+    with TemporaryDirectory() as folder:
+        if path.is_dir():
+            path, read = as_one_file(read, Path(folder))
+        return submit_read(
+            benchmark,
+            read,
+            path,
+            with_agents(sender, file),
+            extras=extras_of(file),
+            recording=recording,
+            replace=replace,
+            why=why,
+            today=today,
+        )
 
 
 def submit_read(

@@ -1,6 +1,7 @@
 """Commands that change or rebuild the board: submit, withdraw, build, verify."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,8 +13,10 @@ from sitegen.cli_common import (
     DateOption,
     FileArgument,
     FormatOption,
+    Given,
     MapOption,
     OutOption,
+    given,
     here,
     options_of,
     print_board,
@@ -68,11 +71,12 @@ def submit(
 ) -> None:
     """Check a predictions file, add it to the benchmark folder, print its scores, rebuild the site."""
     from sitegen.board import build_board, submit_read
+    from sitegen.packing import as_one_file
     from sitegen.rehearsal import report
-    from sitegen.run_folder import extras_of, with_agents
+    from sitegen.run_folder import RUN_FILES, extras_of, with_agents
 
     benchmark = here()
-    given = {
+    said = {
         "name": name,
         "authors": authors,
         "url": url,
@@ -80,12 +84,13 @@ def submit(
         "licence": licence,
         "notes": notes,
     }
-    sender = _sender({**given, "date": date}, about)
+    sender = _sender({**said, "date": date}, about)
     options = options_of(source_format, caption_column, video_map)
-    path, read = _read(benchmark, file, options, markdown, sender.name)
+    named = given(file, context, RUN_FILES)
+    path, read = named.path, _read(benchmark, named, options, markdown, sender.name)
     if path.is_dir():
-        path, read = _as_one_file(read, context)
-    sender = with_agents(sender, file)
+        path, read = as_one_file(read, Path(context.with_resource(TemporaryDirectory())))
+    sender = with_agents(sender, named.home)
     if rehearse:
         _rehearse(benchmark, path, read, sender, preview, markdown, as_json)
         return
@@ -94,7 +99,7 @@ def submit(
         read,
         path,
         sender,
-        extras=extras_of(file),
+        extras=extras_of(named.home),
         recording=recording,
         replace=replace,
         why=why,
@@ -132,8 +137,8 @@ def _sender(given: dict[str, str], about: Path | None) -> "Sender":
 
 
 def _read(
-    benchmark: "Benchmark", file: Path, options: Any, markdown: Path | None, name: str
-) -> "tuple[Path, ReadPredictions]":
+    benchmark: "Benchmark", file: Given, options: Any, markdown: Path | None, name: str
+) -> "ReadPredictions":
     """The file, read; its faults go to the Markdown report too."""
     from pipeline.errors import FaultsError
     from pipeline.files import write_text
@@ -146,19 +151,6 @@ def _read(
         if markdown:
             write_text(markdown, faults_markdown(name, error.faults))
         raise
-
-
-def _as_one_file(read: "ReadPredictions", context: typer.Context) -> "tuple[Path, ReadPredictions]":
-    """What shards hold as the one file that is stored, kept while the command runs."""
-    from dataclasses import replace
-    from tempfile import TemporaryDirectory
-
-    from pipeline.files import sha256_file
-    from pipeline.tables import PREDICTIONS
-
-    path = Path(context.with_resource(TemporaryDirectory())) / "predictions.parquet"
-    PREDICTIONS.write(path, read.predictions)
-    return path, replace(read, sha256=sha256_file(path))
 
 
 def _rehearse(

@@ -1,7 +1,9 @@
 """What the commands of scores and boards share: options, reading a file, and the printed board."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,9 +18,10 @@ if TYPE_CHECKING:
     from sitegen.scoreboard import BoardLine
 
 FileArgument = Annotated[
-    Path,
+    str,  # a path would take s3://a for s3:/a
     typer.Argument(
-        help="Predictions in any format that `check` knows, a folder of Parquet shards, or a run folder."
+        help="Predictions in any format that `check` knows, a folder of Parquet shards, or a run folder; "
+        "a path or any URL that fsspec knows (s3://, https://, ...)."
     ),
 ]
 TruthOption = Annotated[
@@ -64,20 +67,49 @@ def options_of(source_format: str, caption_column: str, video_map: Path | None) 
     return ReadOptions(source_format, caption_column, read_video_map(video_map) if video_map else {})
 
 
-def read_file(
-    file: Path, truth: "Sequence[TruthHazard]", options: "ReadOptions"
-) -> "tuple[Path, ReadPredictions]":
-    """The predictions file meant by `file`, and what it holds.
+@dataclass(frozen=True, slots=True)
+class Given:
+    """Predictions that were named by a path or a URL, where they can be read.
+
+    `home` is what was named, `path` the file or the shards in it, both here or copied here; `name` is
+    what messages call `path`.
+    """
+
+    home: Path
+    path: Path
+    name: str
+
+
+def given(file: str, context: typer.Context, wanted: Sequence[str] = ("predictions.parquet",)) -> Given:
+    """What a path or a URL means; the copy of what is behind a URL is kept while the command runs.
+
+    Raises as `fetched`, which says what is `wanted` of a folder.
+    """
+    from pipeline.places import Place, is_url
+    from sitegen.run_folder import predictions_of
+
+    home = Path(file)
+    if is_url(file):
+        from sitegen.fetched import fetched
+
+        home = fetched(file, Path(context.with_resource(TemporaryDirectory())), wanted)
+    path = predictions_of(home)
+    if not is_url(file):
+        return Given(home, path, str(path))
+    return Given(home, path, file if path == home else str(Place(file) / path.name))
+
+
+def read_file(file: Given, truth: "Sequence[TruthHazard]", options: "ReadOptions") -> "ReadPredictions":
+    """What a predictions file holds.
 
     Parquet is read in a process of its own: a damaged file can end the process that reads it.
     """
     from sitegen.readers import read_predictions
-    from sitegen.run_folder import predictions_of
     from sitegen.sandbox import read_apart
 
-    path = predictions_of(file)
-    apart = path.is_dir() or _holds_parquet(path)
-    return path, read_apart(path, truth, options) if apart else read_predictions(path, truth, options)
+    options = replace(options, name=file.name)
+    apart = file.path.is_dir() or _holds_parquet(file.path)
+    return (read_apart if apart else read_predictions)(file.path, truth, options)
 
 
 def _holds_parquet(path: Path) -> bool:

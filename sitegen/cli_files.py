@@ -1,5 +1,6 @@
 """Commands about a predictions file: check it, score it, compare two."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,8 +12,10 @@ from sitegen.cli_common import (
     CaptionOption,
     FileArgument,
     FormatOption,
+    Given,
     MapOption,
     TruthOption,
+    given,
     here,
     options_of,
     print_board,
@@ -34,6 +37,7 @@ ThresholdOption = Annotated[
 
 
 def check(
+    context: typer.Context,
     file: FileArgument,
     truth: TruthOption = None,
     source_format: FormatOption = "",
@@ -56,10 +60,11 @@ def check(
     options = options_of(source_format, caption_column, video_map)
     hazards = read_truth(truth or here().truth)
     notes: tuple[str, ...] = ()
+    named = given(file, context)
     if fix:
-        file, notes, options = _fixed(file, hazards, options)
+        named, notes, options = _fixed(named, hazards, options)
     try:
-        path, read = read_file(file, hazards, options)
+        read = read_file(named, hazards, options)
     except FaultsError as error:
         if github:
             _annotate(error.faults, (), file)
@@ -71,7 +76,7 @@ def check(
     if as_json:
         console.print_json(
             {
-                "file": str(path),
+                "file": named.name,
                 "format": read.source_format,
                 "sha256": read.sha256,
                 "predictions": len(read.predictions),
@@ -84,45 +89,49 @@ def check(
         )
         return
     if github:
-        _annotate((), read.warnings, path)
+        _annotate((), read.warnings, named.name)
     else:
         say_warnings(read.warnings)
     for note in notes:
         console.stdout().print(f"fixed: {note}", markup=False)
     console.stdout().print(
-        f"{path}: good. {len(read.predictions)} predictions for {covered} of {videos} videos "
+        f"{named.name}: good. {len(read.predictions)} predictions for {covered} of {videos} videos "
         f"({read.source_format}).",
         markup=False,
         soft_wrap=True,
     )
 
 
-def _annotate(faults: "Sequence[Fault]", warnings: "Sequence[str]", file: Path) -> None:
+def _annotate(faults: "Sequence[Fault]", warnings: "Sequence[str]", file: str) -> None:
     from sitegen.annotations import error_lines, warning_lines
 
-    for line in [*error_lines(faults, str(file)), *warning_lines(str(file), warnings)]:
+    for line in [*error_lines(faults, file), *warning_lines(file, warnings)]:
         console.stdout().print(line, markup=False, soft_wrap=True)
 
 
-def _fixed(file: Path, hazards: Any, options: "ReadOptions") -> "tuple[Path, tuple[str, ...], ReadOptions]":
-    """A corrected copy beside the file, what was done, how to read it; the file itself if nothing was."""
+def _fixed(file: Given, hazards: Any, options: "ReadOptions") -> "tuple[Given, tuple[str, ...], ReadOptions]":
+    """A corrected copy, what was done, how to read it; the file itself if nothing was.
+
+    The copy is beside the file, of a URL in the folder that the command runs in.
+    """
     from pipeline.files import write_bytes
+    from pipeline.places import is_url
     from sitegen.fixes import fixed
     from sitegen.readers import ReadOptions
-    from sitegen.run_folder import predictions_of
 
-    path = predictions_of(file)
-    made = fixed(path, hazards, options)
+    made = fixed(file.path, hazards, replace(options, name=file.name))
     if not made.notes:
-        console.stderr().print(f"{path}: nothing to fix that is safe to fix", markup=False)
+        console.stderr().print(f"{file.name}: nothing to fix that is safe to fix", markup=False)
         return file, (), options
-    target = path.with_name(f"{path.name.split('.')[0] or 'predictions'}.fixed.{made.ending}")
+    name = f"{file.path.name.split('.')[0] or 'predictions'}.fixed.{made.ending}"
+    target = Path(name) if is_url(file.name) else file.path.with_name(name)
     write_bytes(target, made.data)
     console.stderr().print(f"wrote {target}", markup=False)
-    return target, made.notes, ReadOptions()
+    return Given(target, target, str(target)), made.notes, ReadOptions()
 
 
 def score(
+    context: typer.Context,
     file: FileArgument,
     truth: TruthOption = None,
     threshold: ThresholdOption = 0.80,
@@ -136,7 +145,7 @@ def score(
 ) -> None:
     """Score a predictions file: BESM, SAM, detection rate, hazard recall, with 95 % intervals."""
     if coool:
-        score_coool(file, truth, driver_truth, videos, video_map, as_json=as_json)
+        score_coool(file, context, truth, driver_truth, videos, video_map, as_json=as_json)
         return
     if driver_truth or videos:
         raise typer.BadParameter("found --driver-truth or --videos; expected --coool with them.")
@@ -146,8 +155,9 @@ def score(
 
     options = options_of(source_format, caption_column, video_map)
     hazards = read_truth(truth or here().truth)
-    path, read = read_file(file, hazards, options)
-    submission = submission_of(path.stem, read)
+    named = given(file, context)
+    read = read_file(named, hazards, options)
+    submission = submission_of(named.path.stem, read)
     evaluation = evaluate(submission, hazards, open_embedder(), threshold, truth_sha256(hazards))
     say_warnings(read.warnings)
     if as_json:
@@ -167,7 +177,10 @@ def score(
 
 
 def compare(
-    a: Annotated[str, typer.Argument(help="A submission's name or slug, or a predictions file.")],
+    context: typer.Context,
+    a: Annotated[
+        str, typer.Argument(help="A submission's name or slug, or predictions as `score` takes them.")
+    ],
     b: Annotated[str, typer.Argument(help="The other one.")],
     truth: TruthOption = None,
     threshold: ThresholdOption = 0.80,
@@ -180,7 +193,7 @@ def compare(
 
     from sitegen.compare import compare as compare_two
 
-    one, other = (_evaluation(name, truth, threshold) for name in (a, b))
+    one, other = (_evaluation(name, context, truth, threshold) for name in (a, b))
     found = compare_two(one, other)
     if as_json:
         console.print_json({key: asdict(comparison) for key, comparison in found.items()})
@@ -207,19 +220,21 @@ def compare(
     output.print(f"signature {one.card.signature}", markup=False, soft_wrap=True)
 
 
-def _evaluation(name: str, truth: Path | None, threshold: float) -> Any:
+def _evaluation(name: str, context: typer.Context, truth: Path | None, threshold: float) -> Any:
     """The scores of a submission of the board, or of a file."""
     from pipeline.errors import InputError
     from pipeline.files import slug
     from pipeline.minilm import open_embedder
+    from pipeline.places import is_url
     from sitegen.evaluate import evaluate, truth_sha256
     from sitegen.readers import ReadOptions, read_truth
     from sitegen.submissions import load_all
 
     hazards = read_truth(truth or here().truth)
-    if Path(name).exists():
-        path, read = read_file(Path(name), hazards, ReadOptions())
-        submission = submission_of(path.stem if path == Path(name) else name, read)
+    if is_url(name) or Path(name).exists():
+        named = given(name, context)
+        read = read_file(named, hazards, ReadOptions())
+        submission = submission_of(named.path.stem if named.path == named.home else name, read)
     else:
         board = {one.slug: one.submission for one in load_all(here().submissions, hazards)}
         if slug(name) not in board:

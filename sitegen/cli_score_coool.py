@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline import console
-from sitegen.cli_common import here, say_warnings
+from sitegen.cli_common import given, here, say_warnings
 
 if TYPE_CHECKING:
     from sitegen.coool_score import CooolScore
@@ -26,11 +26,14 @@ ClipsOption = Annotated[
     typer.Option(help="With --coool: folder of clips, for their lengths. Default: the benchmark folder's."),
 ]
 
+RESULTS = "results.csv"
+
 _WORDS = {"driver_state": "driver state", "hazards": "hazard tracks", "names": "hazard names"}
 
 
 def score_coool(
-    file: Path,
+    file: str,
+    context: typer.Context,
     truth: Path | None,
     driver_truth: Path | None,
     videos: Path | None,
@@ -50,18 +53,32 @@ def score_coool(
     states_path = driver_truth or (beside if beside.is_file() else None)
     known = {hazard.video_id for hazard in hazards}
     states = read_driver_states(states_path, known) if states_path else {}
-    path = file / "results.csv" if file.is_dir() else file
-    results = read_results(path, hazards, read_video_map(video_map) if video_map else {})
+    path, name = _results(file, context)
+    results = read_results(path, hazards, read_video_map(video_map) if video_map else {}, name)
     counts, odd = frame_counts(results, hazards, states, _lengths(videos, known))
     score = coool_score(results, hazards, states, counts)
     warnings = [*results.warnings, *odd]
     say_warnings(warnings)
     if as_json:
-        console.print_json(
-            {"file": str(path), "sha256": results.sha256, **_json(score), "warnings": warnings}
-        )
+        console.print_json({"file": name, "sha256": results.sha256, **_json(score), "warnings": warnings})
     else:
         _print(score)
+
+
+def _results(file: str, context: typer.Context) -> tuple[Path, str]:
+    """The results.csv that a path or URL means, and what messages call it."""
+    from pipeline.errors import InputError
+
+    named = given(file, context, (RESULTS,))
+    if not named.home.is_dir():
+        return named.home, named.name
+    path = named.home / RESULTS
+    if not path.is_file():
+        raise InputError(
+            f"{file}: found a folder without {RESULTS}; expected one with it, or the file itself. "
+            "These rules score what is said of every frame, which shards of predictions do not hold."
+        )
+    return path, f"{file.rstrip('/')}/{RESULTS}"
 
 
 def _lengths(videos: Path | None, known: set[str]) -> dict[str, int]:

@@ -39,12 +39,14 @@ class Results:
     warnings: tuple[str, ...]
 
 
-def read_results(path: Path, truth: Iterable[TruthHazard], video_map: Mapping[str, str]) -> Results:
-    """The results in a file; its videos must be among the truth's.
+def read_results(
+    path: Path, truth: Iterable[TruthHazard], video_map: Mapping[str, str], name: str = ""
+) -> Results:
+    """The results in a file, which faults call `name`; its videos must be among the truth's.
 
     An empty state counts as not changed. Raises FaultsError with every fault.
     """
-    faults = Faults(visible(str(path), 1_000))
+    faults = Faults(visible(name or str(path), 1_000))
     content = content_of(path, faults)
     refuse_other_kind(content.data, "coool", faults)
     rows = list(frame_rows(content.data, faults))

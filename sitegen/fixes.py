@@ -69,7 +69,7 @@ def fixed(
     as a whole cannot be read.
     """
     options = options or ReadOptions()
-    faults = Faults(visible(str(path), 1_000))
+    faults = Faults(visible(options.name or str(path), 1_000))
     content = content_of(path, faults)
     source_format = choose_format(content, options, faults)
     work = _Work(content.data, source_format, truth, options)

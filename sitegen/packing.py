@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from pipeline.errors import FaultsError, InputError
@@ -43,6 +43,13 @@ def fill(
         shutil.copyfile(path, new / f"{table}.parquet")
     about_file.write(new, about)
     return about
+
+
+def as_one_file(read: ReadPredictions, folder: Path) -> tuple[Path, ReadPredictions]:
+    """What shards hold as the one file that is stored, written into `folder`."""
+    path = folder / FILE_NAME
+    PREDICTIONS.write(path, read.predictions)
+    return path, replace(read, sha256=sha256_file(path))
 
 
 def same(target: Path, new: Path, current: About, about: About) -> bool:

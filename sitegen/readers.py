@@ -54,12 +54,13 @@ class ReadOptions:
     """How a predictions file is read; by default its content says so.
 
     `source_format` is one of `FORMATS`, `caption_column` names the column of a 2COOOL file that holds
-    the caption, `video_map` maps a video id of the file to the truth's.
+    the caption, `video_map` maps a video id of the file to the truth's. Faults call the file `name`.
     """
 
     source_format: str = ""
     caption_column: str = ""
     video_map: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +89,7 @@ def read_predictions(
     of the truth that have no prediction are a warning. Raises FaultsError with every fault.
     """
     options = options or ReadOptions()
-    faults = Faults(visible(str(path), 1_000))
+    faults = Faults(visible(options.name or str(path), 1_000))
     content = content_of(path, faults)
     source_format = choose_format(content, options, faults)
     hazards = None if truth is None else list(truth)
@@ -110,7 +111,7 @@ def read_sharded(
     the shard and its row.
     """
     options = options or ReadOptions()
-    faults = Faults(visible(str(folder), 1_000))
+    faults = Faults(visible(options.name or str(folder), 1_000))
     if options.source_format not in ("", "parquet") or options.caption_column:
         faults.stop("a folder", "one file of the format that was asked for", "Give the file itself.")
     shards = read_shards(folder, faults)

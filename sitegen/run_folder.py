@@ -6,10 +6,13 @@ from pathlib import Path
 from sitegen.about import Sender
 from sitegen.packing import EXTRAS
 
+RUN_FILES = ("predictions.parquet", *(f"{name}.parquet" for name in EXTRAS))
+"""The files of a run folder that a submission is made of, the predictions first."""
+
 
 def predictions_of(file: Path) -> Path:
     """The predictions file of a run folder; any other file, or folder of shards, is meant itself."""
-    return file / "predictions.parquet" if (file / "predictions.parquet").is_file() else file
+    return file / RUN_FILES[0] if (file / RUN_FILES[0]).is_file() else file
 
 
 def extras_of(file: Path) -> dict[str, Path]:

@@ -100,7 +100,7 @@ def read_apart(
         "sys_path": [place or str(Path.cwd()) for place in sys.path],
         "path": str(path),
         "truth": None if truth is None else [[one.video_id, not one.is_no_hazard] for one in truth],
-        "options": {name: getattr(options, name) for name in ("source_format", "caption_column")}
+        "options": {name: getattr(options, name) for name in ("source_format", "caption_column", "name")}
         | {"video_map": dict(options.video_map)},
         "memory_bytes": limits.memory_bytes,
         "seconds": limits.seconds,
@@ -110,7 +110,8 @@ def read_apart(
         out.seek(0)
         if out.read(len(MARK)) != MARK and code is not None and code >= 0:
             raise OutsideError(f"The process that reads files does not start: {_last_line(err)}")
-        return _result(path, code, out, {one.video_id for one in truth or ()} or None, limits)
+        name = visible(options.name or str(path), 1_000)
+        return _result(name, code, out, {one.video_id for one in truth or ()} or None, limits)
 
 
 def _run(job: bytes, out: IO[bytes], err: IO[bytes], limits: Limits) -> int | None:
@@ -152,9 +153,8 @@ def _last_line(err: IO[bytes]) -> str:
 
 
 def _result(
-    path: Path, code: int | None, out: IO[bytes], videos: set[str] | None, limits: Limits
+    name: str, code: int | None, out: IO[bytes], videos: set[str] | None, limits: Limits
 ) -> ReadPredictions:
-    name = visible(str(path), 1_000)
     if code is None or (sys.platform != "win32" and code in (-signal.SIGXCPU, -signal.SIGALRM)):
         _stop(name, f"a file that takes more than {limits.seconds:g} seconds to read", limits)
     if code != 0:

@@ -32,6 +32,12 @@ def is_aside(name: str) -> bool:
     return name.startswith(".") or name in ASIDE
 
 
+def limit_shards(count: int, faults: Faults) -> None:
+    """Raise FaultsError for more files than a folder of shards may have."""
+    if count > MAX_SHARDS:
+        faults.stop(f"{count:,} files", f"at most {MAX_SHARDS:,} shards", "Write fewer, larger shards.")
+
+
 @dataclass(frozen=True, slots=True)
 class Shards:
     """The shards' contents by name, in order; `sha256` is of their names and bytes (see `read_shards`)."""
@@ -54,8 +60,7 @@ def read_shards(folder: Path, faults: Faults) -> Shards:
     paths = sorted(found, key=lambda path: path.name)
     if not paths:
         faults.stop("no Parquet file in it", _EXPECTED, "Give a run folder, a folder of shards, or a file.")
-    if len(paths) > MAX_SHARDS:
-        faults.stop(f"{len(paths):,} files", f"at most {MAX_SHARDS:,} shards", "Write fewer, larger shards.")
+    limit_shards(len(paths), faults)
     contents: dict[str, bytes] = {}
     size = 0
     home = folder.resolve()

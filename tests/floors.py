@@ -201,6 +201,7 @@ FLOORS = [
     [
         "sitegen.board_files",
         "sitegen.failure_files",
+        "sitegen.fetched",
         "sitegen.hiding",
         "sitegen.media",
         "sitegen.narrowed",
