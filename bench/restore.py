@@ -17,12 +17,13 @@ from pathlib import Path
 from av.video.reformatter import VideoReformatter
 
 from bench.degrade import BLUR_SIGMA_PX, KINDS, LOGO_ALPHA, NOISE_SIGMA, degraded, psnr, ssim
-from pipeline.data.decode import decoded, read_header, upright
+from pipeline.data.decode import decoded, read_header
 from pipeline.data.encode import EXACT, write_h264
 from pipeline.data.restore import STEPS, RestoreSettings, plan_for, read_timeline, restore_clip
 from pipeline.execute import ProcessExecutor, default_workers
 from pipeline.files import write_text
 from pipeline.records import RgbImage
+from pipeline.video import upright
 
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "docs" / "restore.md"

@@ -65,6 +65,17 @@ def open_clip(path: Path) -> InputContainer:
     return container
 
 
+def upright(
+    frame: av.VideoFrame, reformatter: VideoReformatter, interpolation: int | None = None
+) -> RgbImage:
+    """A decoded frame as RGB (H, W, 3), turned as the file says it is to be shown."""
+    # One thread: FFmpeg would cut each frame in stripes, and waking threads costs more than a conversion.
+    made = reformatter.reformat(frame, format="rgb24", interpolation=interpolation, threads=1)
+    picture = np.asarray(made.to_ndarray(), np.uint8)
+    turns = round(frame.rotation / 90) % 4
+    return np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture
+
+
 @dataclass(frozen=True, slots=True)
 class _Index:
     """What a file's packets say without decoding: `order` maps a presentation time to its frame."""
@@ -113,12 +124,7 @@ class _Reader:
         if max(found) > MAX_SIDE_PX:
             raise VideoError(f"{self._path}: frames of {found[0]}x{found[1]} px are too large.")
         if index in self._wanted:
-            picture = np.asarray(
-                self._reformatter.reformat(frame, format="rgb24").to_ndarray(), dtype=np.uint8
-            )
-            turns = round(frame.rotation / 90) % 4
-            upright = np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture
-            self.rgb[index] = (frame.time or 0.0, upright)
+            self.rgb[index] = (frame.time or 0.0, upright(frame, self._reformatter))
 
 
 def _read_index(path: Path) -> _Index:

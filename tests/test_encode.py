@@ -10,10 +10,10 @@ from av.video.reformatter import VideoReformatter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.data.decode import upright
 from pipeline.data.encode import EXACT, Colour, even_size, write_h264
 from pipeline.errors import OutsideError
 from pipeline.records import RgbImage
+from pipeline.video import upright
 
 SIZE = (64, 48)
 

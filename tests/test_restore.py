@@ -19,7 +19,7 @@ import pytest
 from av.video.reformatter import VideoReformatter
 
 from bench.degrade import degraded, psnr
-from pipeline.data.decode import decoded, read_header, upright
+from pipeline.data.decode import decoded, read_header
 from pipeline.data.denoise import UnsharpMask
 from pipeline.data.encode import EXACT, write_h264
 from pipeline.data.restore import ERASING, RestoreSettings, read_timeline, restore_clip
@@ -28,6 +28,7 @@ from pipeline.data.restore_record import RestoreJob
 from pipeline.errors import InputError, VideoError
 from pipeline.execute import ProcessExecutor, SerialExecutor
 from pipeline.records import RgbImage
+from pipeline.video import upright
 
 ROOT = Path(__file__).parent.parent
 SIZE = (192, 108)

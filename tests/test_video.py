@@ -51,6 +51,16 @@ def test_frames_are_those_of_a_full_decode(tmp_path: Path, gop: int, b_frames: i
     assert found.note == ""
 
 
+def test_pictures_do_not_depend_on_how_many_threads_convert_colours(tmp_path: Path) -> None:
+    pictures = list(np.random.default_rng(2).integers(0, 256, (8, 362, 642, 3), dtype=np.uint8))
+    path = write_clip(tmp_path / "a.mp4", 8, (642, 362), pictures=pictures)
+    with av.open(str(path)) as container:
+        for frame, found in zip(container.decode(video=0), read_keyframes(path, "a").frames, strict=True):
+            for threads in (0, 1, 2, 5):
+                every = frame.reformat(format="rgb24", threads=threads).to_ndarray()
+                np.testing.assert_array_equal(found.rgb, every)
+
+
 def test_shorter_than_n_gives_all_frames(tmp_path: Path) -> None:
     found = read_keyframes(write_clip(tmp_path / "a.mp4", 7), "a", 25)
     assert [grey_index(frame.rgb) for frame in found.frames] == list(range(7))

@@ -178,7 +178,7 @@ def _decoded(facts: ClipFacts, container: InputContainer) -> ClipFacts:
             # A hair early: times are rounded to ticks.
             due = time_s - start_s + 1e-3 >= len(hashes) / RATE_HZ and len(hashes) < MAX_HASHES
             if due:
-                grey = reformatter.reformat(frame, format="gray").to_ndarray()
+                grey = reformatter.reformat(frame, format="gray", threads=1).to_ndarray()
                 hashes.append(frame_hash(np.asarray(grey, np.uint8)))
             count += 1
     if not count:

@@ -7,14 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import av
-import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError, InvalidDataError
-from av.video.reformatter import VideoReformatter
 
 from pipeline.data.encode import Colour
 from pipeline.errors import VideoError
-from pipeline.records import RgbImage
 from pipeline.video import MAX_SIDE_PX, open_clip
 
 
@@ -99,14 +96,3 @@ def _frames(path: Path, container: InputContainer, stream: Any) -> Iterator[av.V
             yield from frames
     except FFmpegError as error:
         raise VideoError(f"{path}: decoding failed: {error}. Copy the file again.") from error
-
-
-def upright(
-    frame: av.VideoFrame, reformatter: VideoReformatter, interpolation: int | None = None
-) -> RgbImage:
-    """A decoded frame as RGB (H, W, 3), turned as the file says it is to be shown."""
-    picture = np.asarray(
-        reformatter.reformat(frame, format="rgb24", interpolation=interpolation).to_ndarray(), np.uint8
-    )
-    turns = round(frame.rotation / 90) % 4
-    return np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture

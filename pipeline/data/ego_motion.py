@@ -93,7 +93,8 @@ def _greys(clip: Path) -> Iterator[tuple[Grey, float]]:
     for frame in decoded(clip):
         width = min(WIDTH_PX, frame.width)
         height = max(1, round(frame.height * width / frame.width))
-        small = reformatter.reformat(frame, width=width, height=height, format="gray").to_ndarray()
+        made = reformatter.reformat(frame, width=width, height=height, format="gray", threads=1)
+        small = made.to_ndarray()
         yield np.ascontiguousarray(np.rot90(small, round(frame.rotation / 90) % 4)), width / frame.width
 
 

@@ -19,7 +19,7 @@ import pyarrow as pa
 from av.video.reformatter import VideoReformatter
 
 from pipeline.config import VerifySettings
-from pipeline.data.decode import decoded, upright
+from pipeline.data.decode import decoded
 from pipeline.data.picture_files import PICTURES, PictureFile, safe_names
 from pipeline.errors import CooolerError, InputError
 from pipeline.files import locked, sha256_file, sha256_of
@@ -27,7 +27,7 @@ from pipeline.interfaces import Executor
 from pipeline.records import Box, RgbImage, TrackBox
 from pipeline.table import metadata
 from pipeline.verify import exclusion
-from pipeline.video import crop, read_keyframes
+from pipeline.video import crop, read_keyframes, upright
 
 MANIFEST = "frames.parquet"
 VERSION = 1

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from av.video.reformatter import VideoReformatter
 
-from pipeline.data.decode import ClipHeader, decoded, read_header, size_of, upright
+from pipeline.data.decode import ClipHeader, decoded, read_header, size_of
 from pipeline.data.encode import EXACT, write_h264
 from pipeline.errors import CooolerError
 from pipeline.records import Box, Kind, RgbImage, TrackBox
+from pipeline.video import upright
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont

@@ -17,7 +17,7 @@ from typing import Literal, TypeAlias
 import cv2
 from av.video.reformatter import VideoReformatter
 
-from pipeline.data.decode import decoded, upright
+from pipeline.data.decode import decoded
 from pipeline.data.detector import Detector, DetectorSettings, detected_boxes, detector_sha256
 from pipeline.data.linking import LinkSettings, Track, distinct, link, named
 from pipeline.data.motion import MotionSettings, motion_boxes
@@ -27,6 +27,7 @@ from pipeline.interfaces import Executor
 from pipeline.records import Kind, RgbImage, TrackBox
 from pipeline.table import metadata
 from pipeline.tables import BOXES
+from pipeline.video import upright
 
 Method: TypeAlias = Literal["motion", "detector", "both"]
 

@@ -15,7 +15,7 @@ import numpy as np
 from av.error import FFmpegError
 from av.video.reformatter import VideoReformatter
 
-from pipeline.data.decode import ClipHeader, decoded, read_header, upright
+from pipeline.data.decode import ClipHeader, decoded, read_header
 from pipeline.data.denoise import Method, deblurrer, denoiser
 from pipeline.data.encode import EXACT, even_size, write_h264
 from pipeline.data.restored_pictures import before_after
@@ -24,7 +24,7 @@ from pipeline.data.watermark_find import SAMPLES, Mask, PixelBox, find_watermark
 from pipeline.errors import VideoError
 from pipeline.files import write_bytes
 from pipeline.records import RgbImage
-from pipeline.video import frame_indices
+from pipeline.video import frame_indices, upright
 
 STEPS = ("watermark", "denoise", "deblur")
 FOLDER = "restoration"  # beside the clips: records, masks, pictures
