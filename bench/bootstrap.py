@@ -8,6 +8,7 @@ from sitegen.score import Real, scorecard
 from sitegen.uncertainty import uncertainties, video_columns
 
 SYSTEMS, VIDEOS, RESAMPLES = 300, 1_000, 1_000
+STEP = 6  # the loops take every sixth system: they would take half a minute, and are linear
 
 
 def board() -> list[Evaluation]:
@@ -41,15 +42,16 @@ def loops(evaluations: list[Evaluation]) -> list[Real]:
 def measure() -> list[Measure]:
     """One row: intervals, bands and ranks of all systems, from evaluations."""
     rows = board()
-    times = interleaved({"ours": lambda: uncertainties(rows), "loops": lambda: loops(rows)}, rounds=1)
+    times = interleaved({"ours": lambda: uncertainties(rows), "loops": lambda: loops(rows[::STEP])})
     return [
         Measure(
             f"{RESAMPLES:,} resamples of {SYSTEMS} systems over {VIDEOS:,} videos",
             times["ours"],
             "plain loops over NumPy",
-            times["loops"],
+            times["loops"] * STEP,
             "under a second",
-            "four intervals, bands and ranks; the loops make the intervals only",
+            "four intervals, bands and ranks; the loops make the intervals only, of every sixth system; "
+            "their time is multiplied",
         )
     ]
 
