@@ -17,7 +17,7 @@ from pipeline.clip_preprocess import Preprocessing, fill_batch
 from pipeline.graphs import open_session
 from tests.tiny_clip import Size, noisy_pictures, write_tiny_clip
 
-CROPS = 96
+CROPS = 64
 LEAST_PX = 175  # smaller ones do not pass the paper's limits
 LABELS = ("cat", "deer", "pedestrian", "car", "truck", "debris on the road", "bicycle", "dog")
 SIZE = Size(width=768, layers=12, heads=12, dim=512)

@@ -19,6 +19,7 @@ from pipeline.data.unpickle import load_plain
 from tests.coool_case import annotations
 
 VIDEOS, FRAMES, OBJECTS = 200, 300, 10
+ROUNDS = 3  # of ten seconds each
 
 
 def _import(source: Path) -> None:
@@ -61,7 +62,7 @@ def measure() -> list[Measure]:
                 "load": partial(load_plain, source),
                 "plain": partial(_plain, source),
             },
-            rounds=3,
+            rounds=ROUNDS,
         )
     what = f"{VIDEOS} videos x {FRAMES} frames x {OBJECTS} objects"
     peer = "plain pickle.load"
@@ -72,10 +73,15 @@ def measure() -> list[Measure]:
             peer,
             times["plain"],
             "seconds; under 1 GB",
-            f"largest memory {peaks[0]} MB, plain {peaks[2]} MB",
+            f"medians of {ROUNDS}; largest memory {peaks[0]} MB, plain {peaks[2]} MB",
         ),
         Measure(
-            f"unpickling {what}", times["load"], peer, times["plain"], "", f"largest memory {peaks[1]} MB"
+            f"unpickling {what}",
+            times["load"],
+            peer,
+            times["plain"],
+            "",
+            f"medians of {ROUNDS}; largest memory {peaks[1]} MB",
         ),
     ]
 

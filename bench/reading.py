@@ -39,11 +39,12 @@ def predictions() -> Iterator[Prediction]:
 def write_all(folder: Path) -> dict[str, Path]:
     """The submission as Parquet, as CSV, and one of as many frames as COOOL results."""
     paths = {name: folder / name for name in ("predictions.parquet", "predictions.csv", "results.csv")}
-    PREDICTIONS.write(paths["predictions.parquet"], list(predictions()))
+    rows = list(predictions())
+    PREDICTIONS.write(paths["predictions.parquet"], rows)
     with paths["predictions.csv"].open("w", encoding="utf-8", newline="") as sink:
         writer = csv.writer(sink)
         writer.writerow(PREDICTION_COLUMNS)
-        for row in predictions():
+        for row in rows:
             lists = ";".join(row.track_ids), ";".join(map(str, row.frame_indices))
             writer.writerow((row.video_id, row.rank, row.description, row.label, *lists))
     counts = {f"v{number:05}": ROWS_A_VIDEO for number in range(VIDEOS)}
