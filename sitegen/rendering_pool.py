@@ -14,7 +14,7 @@ from sitegen.language import speak
 from sitegen.pages import Page
 from sitegen.rendering import find_locale, render
 
-FEW = 200
+FEW = 600
 """Up to so many pages are rendered here: starting workers takes as long."""
 _BATCH = 16
 _WAITING = 4  # batches a worker that are asked for ahead
