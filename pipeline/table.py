@@ -5,6 +5,7 @@ Sorting makes the bytes a function of the rows alone, whatever order they came i
 
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -82,29 +83,39 @@ class Table(Generic[R]):
         return self._read(io.BytesIO(data), name)
 
     def _read(self, source: Path | io.BytesIO, path: str) -> list[R]:
-        try:
-            file = pq.ParquetFile(source)
-        except (pa.ArrowException, OSError) as error:
-            fault = Fault(path, None, None, str(error), "a Parquet file", "Write it again.")
-            raise FaultsError([fault]) from error
-        with file:
+        with self.opened(source, path) as file:
+            return [self.from_row(row) for row in file.read(columns=self.schema.names).to_pylist()]
+
+    @contextmanager
+    def opened(self, source: Path | io.BytesIO, path: str) -> Iterator[pq.ParquetFile]:
+        """The open file, whose columns are these; `path` is how errors call it. Raises as `read` does."""
+        with parquet_faults(path), pq.ParquetFile(source) as file:
             found = {field.name: field.type for field in file.schema_arrow}
-            wanted = {field.name: field.type for field in self.schema}
             faults = [
                 Fault(
                     path,
                     None,
-                    column,
-                    str(found.get(column, "no such column")),
-                    str(kind),
+                    column.name,
+                    str(found.get(column.name, "no such column")),
+                    str(column.type),
                     f"This is not a `{self.name}` table of version {SCHEMA_VERSION}.",
                 )
-                for column, kind in wanted.items()
-                if found.get(column) != kind
+                for column in self.schema
+                if found.get(column.name) != column.type
             ]
             if faults:
                 raise FaultsError(faults)
-            return [self.from_row(row) for row in file.read(columns=list(wanted)).to_pylist()]
+            yield file
+
+
+@contextmanager
+def parquet_faults(path: str) -> Iterator[None]:
+    """Raise FaultsError where a Parquet file, called `path`, cannot be read."""
+    try:
+        yield
+    except (pa.ArrowException, OSError) as error:
+        fault = Fault(path, None, None, str(error), "a Parquet file", "Write it again.")
+        raise FaultsError([fault]) from error
 
 
 def metadata(source: Path | io.BytesIO) -> dict[str, str]:

@@ -34,7 +34,17 @@ from sitegen.gathered import Records, System
 from sitegen.language import fixed
 from sitegen.language import gettext as _
 from sitegen.mentions import Mentions, Question
-from sitegen.sayings import Step, counted, instead, is_recorded, of_caption, quoted, sayings, too_small
+from sitegen.sayings import (
+    Saying,
+    Step,
+    counted,
+    instead,
+    is_recorded,
+    of_caption,
+    quoted,
+    sayings,
+    too_small,
+)
 from sitegen.score import TOLERANCE
 
 
@@ -66,11 +76,24 @@ class _Lost:
 
     hazard: TruthHazard
     others: Sequence[TruthHazard]
-    records: Records | None
+    all_records: Mapping[str, Records]
     best: PairScore | None
     is_near: bool
     caption: tuple[PairScore, str] | None = None
     said: dict[Step, str] = field(default_factory=dict)
+    _heard: dict[Step, tuple[Saying, ...] | None] = field(default_factory=dict)
+
+    @property
+    def records(self) -> Records | None:
+        """The records of its video, which may have to be read from a file."""
+        return self.all_records.get(self.hazard.video_id)
+
+    @property
+    def heard(self) -> dict[Step, tuple[Saying, ...] | None]:
+        """What was said at each step; kept, since one step after the other is asked of all hazards."""
+        if not self._heard:
+            self._heard = {step: sayings(self.records, step) for step in Step}
+        return self._heard
 
     @property
     def is_named(self) -> bool:
@@ -144,9 +167,7 @@ def _sheet(
             found = best.get((row.video_id, row.hazard_id))
             if not _passes(found, threshold):
                 near = _passes(found, threshold - NEAR_MISS)
-                lost[row.video_id, row.hazard_id] = _Lost(
-                    row, rows, system.records.get(row.video_id), found, near
-                )
+                lost[row.video_id, row.hazard_id] = _Lost(row, rows, system.records, found, near)
     captions = []
     for prediction in system.evaluation.submission.predictions:
         mine = pairs.get((prediction.video_id, prediction.rank), {})
@@ -176,7 +197,7 @@ def _ask_captions(mentions: Mentions, sheets: Sequence[_Sheet], threshold: float
 
 def _ask(mentions: Mentions, lost: Iterable[_Lost], step: Step) -> None:
     """Which of the hazards a step mentions; its first likely words are noted."""
-    asked = [(one, said) for one in lost if (said := sayings(one.records, step))]
+    asked = [(one, said) for one in lost if (said := one.heard[step])]
     questions = [
         Question(tuple(text for _, text in said), one.hazard.label, one.hazard.description)
         for one, said in asked
@@ -188,8 +209,7 @@ def _ask(mentions: Mentions, lost: Iterable[_Lost], step: Step) -> None:
 
 def _lost_at(one: _Lost) -> Step | None:
     """The first recorded step after the last one that mentions a hazard; None when none is recorded."""
-    after = (step for step in _STEPS[one.depth :] if is_recorded(one.records, step))
-    return next(after, None)
+    return next((step for step in _STEPS[one.depth :] if one.heard[step] is not None), None)
 
 
 def _blame(sheet: _Sheet, threshold: float) -> Blame:

@@ -1,24 +1,17 @@
 """Reads what a site is made of: truth, boxes, records of pipeline runs, clips."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
-from typing import TypeVar
 
 from pipeline.benchmark import Benchmark
+from pipeline.by_video import ByVideo, Later
 from pipeline.errors import ConfigError
-from pipeline.records import (
-    Match,
-    Snippet,
-    StageOutput,
-    TrackBox,
-    TruthHazard,
-    UsageRow,
-    VideoOutcome,
-)
-from pipeline.table import Table, metadata
-from pipeline.tables import BOXES, MATCHES, OUTCOMES, SNIPPETS, STAGES, USAGE
+from pipeline.records import TrackBox, TruthHazard
+from pipeline.table import metadata
+from pipeline.tables import BOXES, USAGE
 from sitegen import ledger
-from sitegen.gathered import Records, SiteData, System, VideoMedia, path_names
+from sitegen.gathered import SiteData, System, VideoMedia, path_names
 from sitegen.hiding import totals_only, videos_only, words_only
 from sitegen.language import N_, Said
 from sitegen.language import gettext as _
@@ -27,28 +20,25 @@ from sitegen.ledger import Entry
 from sitegen.media import MediaJob, MediaSettings
 from sitegen.readers import read_truth
 from sitegen.restoration import read_restorations
+from sitegen.run_records import read_records
 from sitegen.standings import Standing
-from sitegen.submissions import StoredSubmission
 from sitegen.uncertainty import Uncertainty, require_same_signature, uncertainties
 from sitegen.votes import load_votes
 
 CLIPS = (".mp4", ".m4v", ".webm", ".mov", ".mkv", ".avi")
 
-R = TypeVar("R", TrackBox, StageOutput, Snippet, Match, VideoOutcome, TruthHazard, UsageRow)
-
 
 def read_truth_by_video(benchmark: Benchmark) -> dict[str, tuple[TruthHazard, ...]]:
     """Video id -> its truth rows."""
-    return _grouped(read_truth(benchmark.truth), _video_of)
+    rows = groupby(read_truth(benchmark.truth), lambda row: row.video_id)
+    return {video_id: tuple(found) for video_id, found in rows}
 
 
-def read_boxes(benchmark: Benchmark, video_ids: Iterable[str]) -> dict[str, tuple[TrackBox, ...]]:
+def read_boxes(benchmark: Benchmark, video_ids: Iterable[str]) -> Mapping[str, tuple[TrackBox, ...]]:
     """Video id -> all boxes of it; empty when there is no table of boxes, or when the truth is hidden."""
     if benchmark.settings.hide_truth or not benchmark.boxes.is_file():
         return {}
-    wanted = set(video_ids)
-    rows = [row for row in BOXES.read(benchmark.boxes) if row.video_id in wanted]
-    return _grouped(rows, _video_of)
+    return ByVideo(BOXES, benchmark.boxes, set(video_ids))
 
 
 def read_attribution(benchmark: Benchmark) -> str:
@@ -82,7 +72,7 @@ def media_jobs(
         clip = clips.get(video_id)
         digest = clip_sha256(clip) if clip else ""
         shown = benchmark.settings.show_videos
-        jobs.append(MediaJob(video_id, name, clip, digest, boxes.get(video_id, ()), shown, settings))
+        jobs.append(MediaJob(video_id, name, clip, digest, Later(boxes, video_id), shown, settings))
     return jobs
 
 
@@ -108,9 +98,11 @@ def gather(
     ranked = rank(evaluations, "besm", unsure)
     systems = [_system(row, *known[row.evaluation.submission.name], hidden) for row in ranked]
     on_keyframes = {}
-    for video_id, rows in boxes.items():
+    for video_id in boxes:
         wanted = {frame.index for frame in media[video_id].frames}
-        on_keyframes[video_id] = tuple(row for row in rows if row.frame_index in wanted)
+        on_keyframes[video_id] = (
+            tuple(row for row in boxes[video_id] if row.frame_index in wanted) if wanted else ()
+        )
     entries, ledger_file = read_ledger(benchmark, as_of)
     return SiteData(
         benchmark.settings,
@@ -140,18 +132,8 @@ def read_ledger(benchmark: Benchmark, as_of: str) -> tuple[tuple[Entry, ...], by
 
 def _system(row: Ranked, standing: Standing, uncertainty: Uncertainty, hidden: bool) -> System:
     stored, evaluation = standing.stored, standing.evaluation
-    stages, snippets = _table(stored, STAGES), _table(stored, SNIPPETS)
-    matches = _table(stored, MATCHES)
-    outcomes = {row.video_id: row for rows in _table(stored, OUTCOMES).values() for row in rows}
-    records = {
-        video_id: Records(
-            stages.get(video_id, ()),
-            snippets.get(video_id, ()),
-            matches.get(video_id, ()),
-            outcomes.get(video_id),
-        )
-        for video_id in sorted({*stages, *snippets, *matches, *outcomes})
-    }
+    records = read_records(stored.folder)
+    usage = stored.folder / f"{USAGE.name}.parquet"
     facts = (
         (N_("SHA-256 of the file as it came"), stored.original_sha256),
         (N_("SHA-256 of the predictions"), stored.predictions_sha256),
@@ -171,24 +153,8 @@ def _system(row: Ranked, standing: Standing, uncertainty: Uncertainty, hidden: b
         records=words_only(records) if hidden else records,
         probes=standing.probes,
         history=standing.history,
-        usage=tuple(row for rows in _table(stored, USAGE).values() for row in rows),
+        usage=tuple(USAGE.read(usage)) if usage.is_file() else (),
         licence=stored.licence,
         notes=stored.notes,
         rehearsed=standing.rehearsed,
     )
-
-
-def _table(stored: StoredSubmission, table: Table[R]) -> dict[str, tuple[R, ...]]:
-    path = stored.folder / f"{table.name}.parquet"
-    return _grouped(table.read(path), _video_of) if path.is_file() else {}
-
-
-def _video_of(row: R) -> str:
-    return row.track_box.video_id if isinstance(row, Snippet) else row.video_id
-
-
-def _grouped(rows: Iterable[R], key: Callable[[R], str]) -> dict[str, tuple[R, ...]]:
-    groups: dict[str, list[R]] = {}
-    for row in rows:
-        groups.setdefault(key(row), []).append(row)
-    return {name: tuple(found) for name, found in groups.items()}

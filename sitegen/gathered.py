@@ -1,7 +1,7 @@
 """Everything a site is made of, read and scored, before any page exists."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
@@ -110,10 +110,14 @@ class VideoMedia:
 class Records:
     """What a pipeline run wrote about one video beside its predictions; each part may be empty."""
 
-    stages: tuple[StageOutput, ...] = ()
-    snippets: tuple[Snippet, ...] = ()
-    matches: tuple[Match, ...] = ()
+    stages: Sequence[StageOutput] = ()
+    snippets: Sequence[Snippet] = ()
+    matches: Sequence[Match] = ()
     outcome: VideoOutcome | None = None
+
+    def read(self) -> "Records":
+        """The same with every part as a tuple, where it may have to be read from a file before."""
+        return Records(tuple(self.stages), tuple(self.snippets), tuple(self.matches), self.outcome)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,8 @@ from pipeline.columns import Coded
 from pipeline.predictions import FRAMES, TRACKS, Predictions
 from pipeline.records import TruthHazard
 from pipeline.scores import Evaluation
-from sitegen.gathered import Records
+from pipeline.tables import OUTCOMES, STAGES
+from sitegen.run_records import RunRecords
 
 
 def videos_only(truth: Mapping[str, Sequence[TruthHazard]]) -> dict[str, tuple[TruthHazard, ...]]:
@@ -35,6 +36,6 @@ def totals_only(evaluation: Evaluation) -> Evaluation:
     return Evaluation(replace(submission, predictions=captions, warnings=()), (), (), evaluation.card)
 
 
-def words_only(records: Mapping[str, Records]) -> dict[str, Records]:
+def words_only(records: RunRecords) -> RunRecords:
     """What the stages said; not which tracks were looked at, since the hazards are among them."""
-    return {video_id: Records(stages=said.stages, outcome=said.outcome) for video_id, said in records.items()}
+    return replace(records, shown=frozenset({STAGES.name, OUTCOMES.name}))

@@ -58,7 +58,7 @@ class MediaJob:
     name: str
     clip: Path | None
     clip_sha256: str
-    boxes: tuple[TrackBox, ...]
+    boxes: Sequence[TrackBox]
     show_clip: bool
     settings: MediaSettings = MediaSettings()
 

@@ -54,7 +54,7 @@ def _on_video(system: System, video_id: str) -> System:
         system.predictions.get(video_id, ()),
         (score,) if score else (),
         system.pairs.get(video_id, ()),
-        {video_id: records} if records else {},
+        {video_id: records.read()} if records else {},
         system.blame and Blame(failures_of(system.blame.failures, video_id), ()),
     )
 
