@@ -5,15 +5,15 @@ read; anything else that is no Parquet file is a fault. Every bound of one file 
 together. A row's number is counted over all shards; a fault names the shard and its row there.
 """
 
-import hashlib
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 
 import pyarrow as pa
 
+from pipeline.files import sha256_of
 from sitegen import formats, sheets, texts
 from sitegen.checks import Faults, visible
 from sitegen.columns import DoubtError, RawColumns, raw_columns
@@ -40,14 +40,23 @@ def limit_shards(count: int, faults: Faults) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Shards:
-    """The shards' contents by name, in order; `sha256` is of their names and bytes (see `read_shards`)."""
+    """The shards, in order: how faults call each, its path and hash, by name; see `read_shards`."""
 
-    contents: Mapping[str, bytes]
+    paths: Mapping[str, tuple[str, Path, str]]
     sha256: str
+
+    def contents(self) -> Iterator[tuple[str, bytes]]:
+        """Each shard's name and bytes, which are read again. Raises FaultsError when they are others now."""
+        for name, (called, path, sha256) in self.paths.items():
+            here = Faults(called)
+            data = bounded_bytes(path, here, "a Parquet file")
+            if sha256_of(data) != sha256:
+                here.stop("a file that changed while it was read", "a Parquet file", "Try again.")
+            yield name, data
 
 
 def read_shards(folder: Path, faults: Faults) -> Shards:
-    """The content of every shard of a folder.
+    """The shards of a folder; each is read once, and not kept, so that all of them need not fit in memory.
 
     The hash is of the text that `sha256sum` gives of them: for each a line of its content's SHA-256, two
     blanks and its name. Raises FaultsError for links out of the folder, for what is no Parquet file, for
@@ -61,33 +70,32 @@ def read_shards(folder: Path, faults: Faults) -> Shards:
     if not paths:
         faults.stop("no Parquet file in it", _EXPECTED, "Give a run folder, a folder of shards, or a file.")
     limit_shards(len(paths), faults)
-    contents: dict[str, bytes] = {}
+    shards: dict[str, tuple[str, Path, str]] = {}
     size = 0
     home = folder.resolve()
     for path in paths:
         here = Faults(_name(faults, path.name))
         if path.is_symlink() and path.resolve().parent != home:
             here.stop("a link out of the folder", "a file in it", "Copy the file itself.")
-        contents[path.name] = data = bounded_bytes(path, here, "a Parquet file")
+        data = bounded_bytes(path, here, "a Parquet file")
         refuse_empty(data, here, "a Parquet file")
         refuse_other_kind(data, "parquet", here)
+        shards[path.name] = here.file, path, sha256_of(data)
         size += len(data)
         if size > formats.MAX_BYTES:
             limit = f"{formats.MAX_BYTES // 2**20} MB"
             faults.stop(f"more than {limit}", f"at most {limit} in all shards", "Leave out predictions.")
-    lines = (f"{hashlib.sha256(data).hexdigest()}  {name}\n" for name, data in contents.items())
-    sha256 = hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
-    return Shards(contents, sha256)
+    lines = (f"{sha256}  {name}\n" for name, (_, _, sha256) in shards.items())
+    return Shards(shards, sha256_of("".join(lines).encode("utf-8", "surrogateescape")))
 
 
 def shards_columns(shards: Shards, known: tuple[str, ...]) -> RawColumns | None:
     """The shards' columns one below the other; None when in doubt, or when they are not all alike."""
     parts: list[RawColumns] = []
-    rows = listed = 0
-    if sum(map(sheets.unpacked_bytes, shards.contents.values())) > sheets.MAX_UNPACKED_BYTES:
-        return None
-    for data in shards.contents.values():
-        part = raw_columns(data, "parquet", known)
+    rows = listed = unpacked = 0
+    for _, data in shards.contents():
+        unpacked += sheets.unpacked_bytes(data)
+        part = raw_columns(data, "parquet", known) if unpacked <= sheets.MAX_UNPACKED_BYTES else None
         if part is None or part.names != (parts or [part])[0].names:
             return None
         rows += part.rows
@@ -117,7 +125,7 @@ def shards_sheet(shards: Shards, known: tuple[str, ...], faults: Faults) -> Shee
     """
     parts: dict[str, Sheet] = {}
     rows = unpacked = items = 0
-    for name, data in shards.contents.items():
+    for name, data in shards.contents():
         unpacked += sheets.unpacked_bytes(data)
         if unpacked > sheets.MAX_UNPACKED_BYTES:
             expected = f"at most {sheets.MAX_UNPACKED_BYTES:,} bytes in all shards"

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from pipeline.records import Prediction, TruthHazard
 from pipeline.tables import PREDICTIONS
 from sitegen import formats, sheets, texts
+from sitegen.checks import Faults
 from sitegen.readers import ReadOptions, read_given, read_predictions, read_sharded
 from sitegen.sandbox import read_apart
+from sitegen.shards import read_shards
 from tests.faulty import faults, files
 
 ROWS = [
@@ -117,3 +119,11 @@ def test_bounds_hold_for_the_sum(
     monkeypatch.setattr(module, name, limit)
     ((row, column, said),) = faults(lambda: read_sharded(tmp_path))
     assert (row, column) == (None, None) and found in said
+
+
+def test_a_shard_that_changes_is_not_mixed_up(tmp_path: Path) -> None:
+    read = read_shards(write_shards(tmp_path, ROWS[:5], ROWS[5:]), Faults("shards"))
+    whole = {path.name: path.read_bytes() for path in sorted(tmp_path.iterdir())}
+    assert dict(read.contents()) == whole
+    PREDICTIONS.write(tmp_path / "part-1.parquet", ROWS)
+    assert files(lambda: list(read.contents())) == ["shards/part-1.parquet"]
