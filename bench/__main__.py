@@ -30,8 +30,7 @@ from bench import (
     scoring,
     site,
 )
-from bench.machine import machine, versions
-from bench.timing import Measure
+from bench.timing import Measure, report
 from pipeline.benchmark import Benchmark, open_benchmark
 from pipeline.files import write_text
 from sitegen.demo import run_demo
@@ -63,27 +62,9 @@ def jobs(benchmark: Benchmark, submitted: Benchmark) -> dict[str, Job]:
     }
 
 
-def report(measures: list[Measure]) -> str:
-    """The measurements as a Markdown table, under what they were measured on."""
-    lines = [
-        "# Measurements",
-        "",
-        f"{machine()}. {versions()}.",
-        "",
-        "Made by `make bench`. Each row is of one run: medians of at least five rounds in which ours and its",
-        "floor or peer take turns, unless the note says otherwise. Machines are noisy: the ratios count, the",
-        "seconds do not.",
-        "",
-        "| what | ours | against | theirs | ratio | goal | note |",
-        "|---|---:|---|---:|---:|---|---|",
-    ]
-    for one in measures:
-        theirs = "" if one.peer_s is None else f"{one.peer_s:.4g} s"
-        ratio = "" if one.ratio is None else f"{one.ratio:.3g}"
-        lines.append(
-            f"| {one.what} | {one.ours_s:.4g} s | {one.peer} | {theirs} | {ratio} | {one.goal} | {one.note} |"
-        )
-    return "\n".join(lines) + "\n"
+MADE_BY = """Made by `make bench`. Each row is of one run: medians of at least five rounds in which ours and its
+floor or peer take turns, unless the note says otherwise. Boards of 20,000 videos are in
+[growth.md](growth.md)."""
 
 
 def main(names: list[str]) -> None:
@@ -107,7 +88,7 @@ def main(names: list[str]) -> None:
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
                 measures += alone.submit(function, *arguments).result()
             print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr)
-    text = report(measures)
+    text = report("Measurements", MADE_BY, measures)
     if not names:
         write_text(HERE / "report.md", text)
     print(text)

@@ -1,8 +1,8 @@
 """What a rebuild costs: nothing changed, another truth row, a submission more, a video more.
 
-The boards are generated: 10 systems on 200 videos with the demo's clips, and on 2,000 and 20,000 without
-clips, whose cost does not depend on how many there are. Every build scores all submissions again, with
-their vectors cached. `python -m bench.rebuild 2000` measures 2,000 videos with the demo's clips alone.
+The boards are generated: 10 systems on 200 videos with the demo's clips, and on 2,000 without clips, whose
+cost does not depend on how many there are; `bench.growth` has 20,000. Every build scores all submissions
+again, with their vectors cached. `python -m bench.rebuild 2000` measures 2,000 videos with the demo's clips.
 """
 
 import os
@@ -32,8 +32,7 @@ from sitegen.submissions import store
 
 DEMO = Path(__file__).parent.parent / "demo"
 SYSTEMS = 10
-FEW, MANY, MOST = 200, 2_000, 20_000
-LINEAR = 1.1
+FEW, MANY = 200, 2_000
 EMBEDDED = 2_000  # captions, by whose time that of more is told
 Times = dict[str, list[float]]
 
@@ -136,27 +135,6 @@ def rows_of(videos: int, has_clips: bool, rounds: int, spent: Mapping[str, float
     ]
 
 
-def growth(many: Mapping[str, float], most: Mapping[str, float]) -> list[Measure]:
-    """What ten times the videos cost, in tenths: a row for each step."""
-    names = {
-        "score": "scores, vectors cached",
-        "full": "full build",
-        "nothing": "nothing changed",
-        "truth": "one truth row changed",
-        "submission": "a submission more",
-    }
-    return [
-        Measure(
-            f"{MOST:,} videos x {SYSTEMS} systems, no clips: {name}",
-            most[what],
-            f"{MOST // MANY} times that of {MANY:,}",
-            MOST // MANY * many[what],
-            f"at most {LINEAR}",
-        )
-        for what, name in names.items()
-    ]
-
-
 def change_truth(benchmark: Benchmark, turn: int) -> None:
     """Describe the hazard of one video in other words."""
     rows = read_truth(benchmark.truth)
@@ -198,14 +176,11 @@ def one_more_video(root: Path, rounds: int = 5) -> list[Measure]:
 
 
 def measure() -> list[Measure]:
-    """A row for a video more, three for each size of board, and how the cost grows."""
+    """A row for a video more, and three for each size of board."""
     with scratch() as root:
         rows = one_more_video(root / "sixteen")
-        few = board_of(root / "few", demo_clips(root / "clips"), FEW, 5)
-        many = board_of(root / "many", [], MANY, 5)
-        most = board_of(root / "most", [], MOST, 1)
-    rows += rows_of(FEW, True, 5, few) + rows_of(MANY, False, 5, many) + rows_of(MOST, False, 1, most)
-    return rows + growth(many, most)
+        rows += rows_of(FEW, True, 5, board_of(root / "few", demo_clips(root / "clips"), FEW, 5))
+        return rows + rows_of(MANY, False, 5, board_of(root / "many", [], MANY, 5))
 
 
 @contextmanager

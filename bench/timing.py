@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bench.machine import machine, versions
+
 
 @dataclass(frozen=True, slots=True)
 class Measure:
@@ -21,6 +23,28 @@ class Measure:
     def ratio(self) -> float | None:
         """Ours / peer."""
         return None if not self.peer_s else self.ours_s / self.peer_s
+
+
+def report(title: str, made_by: str, measures: list[Measure]) -> str:
+    """The measurements as a Markdown table, under what they were measured on and what `made_by` says."""
+    lines = [
+        f"# {title}",
+        "",
+        f"{machine()}. {versions()}.",
+        "",
+        made_by,
+        "Machines are noisy: the ratios count, the seconds do not.",
+        "",
+        "| what | ours | against | theirs | ratio | goal | note |",
+        "|---|---:|---|---:|---:|---|---|",
+    ]
+    for one in measures:
+        theirs = "" if one.peer_s is None else f"{one.peer_s:.4g} s"
+        ratio = "" if one.ratio is None else f"{one.ratio:.3g}"
+        lines.append(
+            f"| {one.what} | {one.ours_s:.4g} s | {one.peer} | {theirs} | {ratio} | {one.goal} | {one.note} |"
+        )
+    return "\n".join(lines) + "\n"
 
 
 def interleaved(functions: dict[str, Callable[[], object]], rounds: int = 5) -> dict[str, float]:
