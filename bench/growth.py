@@ -21,8 +21,8 @@ STEPS = {
     "truth": "one truth row changed",
     "submission": "a submission more",
 }
-MADE_BY = """Made by `python -m bench.growth`. Both sizes are of one run; what is no median of five is measured
-once."""
+MADE_BY = """Made by `python -m bench.growth`. Both sizes are of one run; what is no median of five is
+measured once."""
 
 
 def rows_of_growth(many: Mapping[str, float], most: Mapping[str, float]) -> list[Measure]:

@@ -1,7 +1,6 @@
 """Commands that change or rebuild the board: submit, withdraw, build, verify."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -70,6 +69,8 @@ def submit(
     as_json: JsonOption = False,
 ) -> None:
     """Check a predictions file, add it to the benchmark folder, print its scores, rebuild the site."""
+    from tempfile import TemporaryDirectory
+
     from sitegen.board import build_board, submit_read
     from sitegen.packing import as_one_file
     from sitegen.rehearsal import report

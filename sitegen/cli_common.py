@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -90,6 +89,8 @@ def given(file: str, context: typer.Context, wanted: Sequence[str] = ("predictio
 
     home = Path(file)
     if is_url(file):
+        from tempfile import TemporaryDirectory
+
         from sitegen.fetched import fetched
 
         home = fetched(file, Path(context.with_resource(TemporaryDirectory())), wanted)
