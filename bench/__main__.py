@@ -62,8 +62,8 @@ def jobs(benchmark: Benchmark, submitted: Benchmark) -> dict[str, Job]:
     }
 
 
-MADE_BY = """Made by `make bench`. Each row is of one run: medians of at least five rounds in which ours and its
-floor or peer take turns, unless the note says otherwise. Boards of 20,000 videos are in
+MADE_BY = """Made by `make bench`. Each row is of one run: medians of at least five rounds in which ours and
+its floor or peer take turns, unless the note says otherwise. Boards of 20,000 videos are in
 [growth.md](growth.md)."""
 
 
