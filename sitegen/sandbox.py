@@ -111,6 +111,8 @@ def read_apart(
         if out.read(len(MARK)) != MARK and code is not None and code >= 0:
             raise OutsideError(f"The process that reads files does not start: {_last_line(err)}")
         name = visible(options.name or str(path), 1_000)
+        if code and _last_line(err) == "MemoryError":  # it had too little left to tell
+            _stop(name, _too_much(limits), limits)
         return _result(name, code, out, {one.video_id for one in truth or ()} or None, limits)
 
 
@@ -170,7 +172,7 @@ def _result(
         if said.faults:
             raise FaultsError(said.faults)
         if said.stopped == "memory":
-            _stop(name, f"a file that takes more than {limits.memory_bytes // 2**20:,} MB of memory", limits)
+            _stop(name, _too_much(limits), limits)
         if said.stopped:
             _stop(name, f"a file that cannot be read ({visible(said.stopped, 300)})", limits)
         predictions = _clean_columns(table, videos)
@@ -188,6 +190,10 @@ def _result(
         said.config_sha256,
         said.ending,
     )
+
+
+def _too_much(limits: Limits) -> str:
+    return f"a file that takes more than {limits.memory_bytes // 2**20:,} MB of memory"
 
 
 def _stop(name: str, found: str, limits: Limits) -> NoReturn:

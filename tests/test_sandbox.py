@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -57,6 +58,17 @@ def test_faults_are_those_found_here(tmp_path: Path, content: bytes) -> None:
 def test_a_missing_file_is_a_fault(tmp_path: Path) -> None:
     (fault,) = faults_of(tmp_path / "gone").faults
     assert fault.found == "no such file"
+
+
+def test_a_process_without_memory_to_tell_of_it(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(_job: bytes, out: IO[bytes], err: IO[bytes], _limits: Limits) -> int:
+        out.write(sandbox.MARK)
+        err.write(b"Traceback\nMemoryError\n")
+        return 1
+
+    monkeypatch.setattr(sandbox, "_run", run)
+    (fault,) = faults_of(file, Limits(memory_bytes=900 * 2**20, seconds=60.0)).faults
+    assert "more than 900 MB" in fault.found and fault.row is None
 
 
 @needs_limits
