@@ -67,7 +67,7 @@ def check(
         read = read_file(named, hazards, options)
     except FaultsError as error:
         if github:
-            _annotate(error.faults, (), file)
+            _annotate(error.faults, (), named.name)
         for note in notes:
             console.stderr().print(f"fixed: {note}", markup=False)
         raise

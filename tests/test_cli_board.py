@@ -106,6 +106,10 @@ def test_check_tells_a_workflow_where(folder: Path) -> None:
     lines = [line for line in run.stdout.splitlines() if line.startswith("::error ")]
     assert len(lines) == 2
     assert all("file=bad.csv" in line and "line=4" in line for line in lines)
+    (folder / "odd.csv").write_text("Video ID,Rank,Description\n v9 ,1,  A cat \n")
+    run = coooler(folder, "check", "odd.csv", "--github", "--fix")
+    (line,) = [line for line in run.stdout.splitlines() if line.startswith("::error ")]
+    assert "file=odd.fixed.csv" in line, "its lines are those of the corrected copy"
 
 
 def test_check_fixes_what_is_safe_and_leaves_the_file_alone(folder: Path) -> None:

@@ -1,7 +1,6 @@
 """Predictions behind a URL are read, checked and stored as the same bytes at a path are."""
 
 import http.server
-import importlib.util
 import json
 import threading
 import uuid
@@ -240,7 +239,6 @@ def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         fetched("nowhere://x.csv", tmp_path)
 
 
-@pytest.mark.skipif(importlib.util.find_spec("aiohttp") is None, reason="fsspec reads http by aiohttp")
 def test_a_web_server(home: Path) -> None:
     handler = partial(http.server.SimpleHTTPRequestHandler, directory=str(home))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
