@@ -76,7 +76,8 @@ def compare_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
     if len(data.systems) < 2:
         return
     first: list[int] = []
-    entries = [_video(data, video_id) for video_id in data.video_ids]
+    video_ids = data.video_ids
+    entries = [_video(data, video_id) for video_id in video_ids]
     for number, (start, part) in enumerate(_parts(entries, 0)):
         first.append(start)
         yield _file(f"videos/{number}", part)
@@ -84,11 +85,11 @@ def compare_files(data: SiteData) -> Iterator[tuple[str, bytes]]:
     for place, system in enumerate(tested(data)):
         yield _file(f"tests/{system.slug}", script_json(_tests(data, place)))
     for system in data.systems:
-        scores = [system.scores[video_id] for video_id in data.video_ids]
+        scores = [system.scores[video_id] for video_id in video_ids]
         yield _file(f"found/{system.slug}", script_json(_bits([score.detected for score in scores])))
         for block in range(0, len(scores), BLOCK):
             number = block // BLOCK
-            ids = data.video_ids[block : block + BLOCK]
+            ids = video_ids[block : block + BLOCK]
             parts = list(_parts([_captions(system, video_id) for video_id in ids], block))
             for cut, (_start, part) in enumerate(parts):
                 yield _file(f"captions/{system.slug}/{number}-{cut}", part)

@@ -187,8 +187,9 @@ def _sets(data: SiteData, systems: Sequence[System], found: Mask) -> tuple[tuple
 
 
 def _solved(data: SiteData, name: str, places: Index) -> Solved:
-    ids = [data.video_ids[place] for place in places[:SHOWN_VIDEOS]]
-    links = tuple(Link(visible(video_id), video_href(data, video_id)) for video_id in ids)
+    ids = data.video_ids
+    shown = [ids[place] for place in places[:SHOWN_VIDEOS]]
+    links = tuple(Link(visible(video_id), video_href(data, video_id)) for video_id in shown)
     return Solved(name, len(places), rate(len(places) / len(data.truth)), links, len(places) - len(links))
 
 
