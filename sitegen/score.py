@@ -129,7 +129,7 @@ def score_pairs(
     value = np.maximum.reduceat(similarity, first_pair) if len(first_pair) else similarity
     if len(n_predictions) and n_predictions.max() > 2:
         # The last bit of a sum of three depends on their order, which must not matter.
-        value = value[np.lexsort((value, video))]
+        value = _sorted_within(value, video)
 
     best, worst, mean = np.zeros(n_videos), np.zeros(n_videos), np.zeros(n_videos)
     if len(value):
@@ -183,6 +183,17 @@ def scorecard(videos: VideoArrays | Sequence[VideoScore], signature: Signature) 
         n_videos=n,
         signature=signature,
     )
+
+
+def _sorted_within(values: Real, keys: Index) -> Real:
+    """The values, ascending within each run of equal ascending `keys`.
+
+    As `np.lexsort` orders them, but by plain sorts, which NumPy does with vector instructions.
+    """
+    order = np.argsort(values)
+    rank = np.empty(len(values), dtype=np.int64)
+    rank[order] = np.arange(len(values))
+    return np.asarray(values[order][np.sort(keys * len(values) + rank) % len(values)])
 
 
 def _starts(keys: Index) -> Index:
