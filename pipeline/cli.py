@@ -1,5 +1,6 @@
 """The pipeline's commands. Heavy modules are imported inside them, so that --help is quick."""
 
+import gc
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -37,6 +38,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON documen
 
 def main() -> None:
     """Run the command line. Exit 0 good, 1 the input is wrong, 2 usage, 3 something outside failed."""
+    gc.freeze()  # the modules stay to the end: no search for garbage, not even the last, needs to see them
     try:
         app()
     except CooolerError as error:
