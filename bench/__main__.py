@@ -63,8 +63,8 @@ def jobs(benchmark: Benchmark, submitted: Benchmark) -> dict[str, Job]:
 
 
 MADE_BY = """Made by `make bench`. Each row is of one run: medians of at least five rounds in which ours and
-its floor or peer take turns, unless the note says otherwise. Boards of 20,000 videos are in
-[growth.md](growth.md)."""
+its floor or peer take turns, unless the note says otherwise. Boards of 20,000 videos follow below, as
+`python -m bench.growth` last measured them."""
 
 
 def main(names: list[str]) -> None:
@@ -90,7 +90,8 @@ def main(names: list[str]) -> None:
             print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr)
     text = report("Measurements", MADE_BY, measures)
     if not names:
-        write_text(HERE / "report.md", text)
+        growth = (HERE / "growth.md").read_text(encoding="utf-8")
+        write_text(HERE / "report.md", f"{text}\n#{growth}")  # its title one level down
     print(text)
 
 
