@@ -92,8 +92,10 @@ def pair_cosines(units: Real, left: Index, right: Index) -> Real:
 
 
 def similarities(cosines: Real) -> Real:
-    """Cosines clipped pair by pair to [0, 1] (ours; the paper says 0 to 1), same shape."""
-    return np.clip(cosines, 0.0, 1.0)
+    """Cosines clipped pair by pair to [0, 1] (ours; the paper says 0 to 1), same shape. -0.0 becomes 0.0."""
+    clipped = np.clip(cosines, 0.0, 1.0)
+    clipped += 0.0  # which of two zeros is the least would depend on their order, which must not matter
+    return clipped
 
 
 def passes(similarity: Real, threshold: float) -> Mask:

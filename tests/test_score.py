@@ -185,6 +185,14 @@ def test_order_of_predictions_does_not_matter(orders: tuple[list[float], list[fl
 
 
 @settings(deadline=None)
+@given(st.permutations([0.0, -0.0, 0.0, -0.0]))
+def test_a_zero_has_no_sign(cosines: list[float]) -> None:
+    score = _score(*((cosine,) for cosine in cosines))
+    zeros = score.best, score.worst, score.mean, score.besm
+    assert all(math.copysign(1.0, zero) == 1.0 for zero in zeros)
+
+
+@settings(deadline=None)
 @given(COSINE, st.integers(2, 9))
 def test_repeating_the_only_prediction_changes_nothing(cosine: float, times: int) -> None:
     once, often = _score((cosine,)), _score(*[(cosine,)] * times)
